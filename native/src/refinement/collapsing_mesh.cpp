@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "job/error.h"
 #include "scene/triangulation.h"
 
 namespace raybundle {
@@ -14,10 +15,29 @@ using Vertex = CollapsingMesh::Mesh3::VertexHandle;
 // Values on both sides of an edge that differ by less than this share of their tolerance are equal.
 constexpr float kSameValue = 1e-3f;
 
+void check(const Mesh& source, const SimplificationLimits& limits) {
+    const auto need = [](bool isRight, const char* what) {
+        if (!isRight) throw invalidArgument(what);
+    };
+    need(limits.distance > 0 && std::isfinite(limits.distance), "the distance must be positive");
+    for (float tolerance : limits.tolerances)
+        need(tolerance > 0 && std::isfinite(tolerance), "all tolerances must be positive");
+    need(limits.faceKinds.empty() || limits.faceKinds.size() == source.faceCount(),
+         "there must be a kind per face");
+    need(limits.keptEdges.empty() || limits.keptEdges.size() == source.cornerCount(),
+         "there must be a mark per corner");
+    need(limits.values.size() == source.cornerCount() * limits.tolerances.size(),
+         "there must be as many values per corner as tolerances");
+    need(std::all_of(limits.values.begin(), limits.values.end(),
+                     [](float value) { return std::isfinite(value); }),
+         "all values must be finite");
+}
+
 }  // namespace
 
 CollapsingMesh::CollapsingMesh(const Mesh& source, const SimplificationLimits& limits)
     : source(source), limits(limits) {
+    check(source, limits);
     cutIntoTriangles();
     keepWhatCannotBeStored();
     addVertices();

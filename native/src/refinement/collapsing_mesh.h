@@ -34,7 +34,7 @@ class CollapsingMesh {
     using Mesh3 = OpenMesh::TriMesh_ArrayKernelT<>;
 
     // Cuts the faces of a mesh into triangles and finds the features. References must outlive the
-    // object.
+    // object. Throws Error with INVALID_ARGUMENT if the limits do not fit the mesh.
     CollapsingMesh(const Mesh& source, const SimplificationLimits& limits);
 
     // Returns a key of two vertices, whatever their order.

@@ -7,7 +7,6 @@
 #include <numeric>
 #include <queue>
 
-#include "job/error.h"
 #include "refinement/collapsing_mesh.h"
 
 namespace raybundle {
@@ -16,6 +15,7 @@ namespace {
 using Triangle = CollapsingTriangle;
 using VertexHandle = CollapsingMesh::Mesh3::VertexHandle;
 using HalfedgeHandle = CollapsingMesh::Mesh3::HalfedgeHandle;
+constexpr auto pairKey = CollapsingMesh::pairKey;
 
 // Least cosine between the normals of a triangle before and after a collapse.
 constexpr double kLeastTurn = 0.5;
@@ -107,6 +107,9 @@ class Simplifier {
     float changeOn(const Side& side, int32_t vertex, bool all);
     Place nearest(const std::vector<std::array<glm::dvec3, 3>>& triangles,
                   const glm::dvec3& p) const;
+    // Returns the change of a value at a corner of the source that lies at a place of a triangle.
+    double changeOf(size_t value, int32_t corner, const std::array<int32_t, 3>& corners,
+                    const Place& place) const;
     float changeAt(int32_t corner, const std::array<int32_t, 3>& corners, const Place& place) const;
     void queueEdgesFrom(VertexHandle vertex);
     void collapse(HalfedgeHandle edge);
@@ -180,18 +183,22 @@ Simplifier::Place Simplifier::nearest(const std::vector<std::array<glm::dvec3, 3
     return place;
 }
 
+double Simplifier::changeOf(size_t value, int32_t corner, const std::array<int32_t, 3>& corners,
+                            const Place& place) const {
+    const auto at = [&](int32_t c) {
+        return double(limits.values[size_t(c) * limits.tolerances.size() + value]);
+    };
+    return place.weights[0] * at(corners[0]) + place.weights[1] * at(corners[1]) +
+           place.weights[2] * at(corners[2]) - at(corner);
+}
+
 // Returns the largest change at a corner of the source, relative to its limit.
 float Simplifier::changeAt(int32_t corner, const std::array<int32_t, 3>& corners,
                            const Place& place) const {
     float most = float(std::sqrt(place.distance2)) / limits.distance;
-    const size_t width = limits.tolerances.size();
-    for (size_t k = 0; k < width; ++k) {
-        double value = 0;
-        for (size_t c = 0; c < 3; ++c)
-            value += place.weights[int(c)] * limits.values[size_t(corners[c]) * width + k];
-        most = std::max(most, float(std::abs(value - limits.values[size_t(corner) * width + k])) /
-                                  limits.tolerances[k]);
-    }
+    for (size_t k = 0; k < limits.tolerances.size(); ++k)
+        most = std::max(
+            most, float(std::abs(changeOf(k, corner, corners, place))) / limits.tolerances[k]);
     return most;
 }
 
@@ -269,10 +276,10 @@ void Simplifier::collapse(HalfedgeHandle edge) {
         int32_t next = -1;
         for (const auto other : mesh.vv_range(VertexHandle(v0)))
             if (other.idx() != v1 && surface.isFeature(v0, other.idx())) next = other.idx();
-        const int32_t beginsAt = surface.features[CollapsingMesh::pairKey(v0, next)];
-        surface.features.erase(CollapsingMesh::pairKey(v0, next));
-        surface.features.erase(CollapsingMesh::pairKey(v0, v1));
-        surface.features[CollapsingMesh::pairKey(v1, next)] = beginsAt;
+        const int32_t beginsAt = surface.features[pairKey(v0, next)];
+        surface.features.erase(pairKey(v0, next));
+        surface.features.erase(pairKey(v0, v1));
+        surface.features[pairKey(v1, next)] = beginsAt;
     }
     for (const Side& side : sides) {
         if (side.changing.empty()) continue;
@@ -323,8 +330,7 @@ SimplifiedMesh Simplifier::result() const {
     SimplifiedMesh made;
     std::vector<std::vector<const Triangle*>> ofFace(source.faceCount());
     for (const Triangle& t : triangles) ofFace[size_t(t.face)].push_back(&t);
-    const size_t width = limits.tolerances.size();
-    std::vector<double> squares(width);
+    std::vector<double> squares(limits.tolerances.size());
     size_t removed = 0;
     auto addFace = [&](int32_t face, const auto& corners, const auto& edges) {
         made.sourceCorners.insert(made.sourceCorners.end(), corners.begin(), corners.end());
@@ -346,8 +352,8 @@ SimplifiedMesh Simplifier::result() const {
             if (t->isRemoved) continue;
             std::array<int32_t, 3> edges;
             for (size_t k = 0; k < 3; ++k) {
-                const auto feature = surface.features.find(
-                    CollapsingMesh::pairKey(t->vertex[k], t->vertex[(k + 1) % 3]));
+                const auto feature =
+                    surface.features.find(pairKey(t->vertex[k], t->vertex[(k + 1) % 3]));
                 edges[k] = feature == surface.features.end() ? -1 : feature->second;
             }
             addFace(int32_t(f), t->corner, edges);
@@ -355,13 +361,8 @@ SimplifiedMesh Simplifier::result() const {
                 const Place place =
                     nearest({surface.pointsOf(t->corner)}, surface.positionOf(corner));
                 ++removed;
-                for (size_t k = 0; k < width; ++k) {
-                    double change = -double(limits.values[size_t(corner) * width + k]);
-                    for (size_t c = 0; c < 3; ++c)
-                        change += place.weights[int(c)] *
-                                  double(limits.values[size_t(t->corner[c]) * width + k]);
-                    squares[k] += change * change;
-                }
+                for (size_t k = 0; k < squares.size(); ++k)
+                    squares[k] += std::pow(changeOf(k, corner, t->corner, place), 2);
             }
         }
     }
@@ -374,28 +375,9 @@ SimplifiedMesh Simplifier::result() const {
     return made;
 }
 
-void check(const Mesh& source, const SimplificationLimits& limits) {
-    const auto need = [](bool isRight, const char* what) {
-        if (!isRight) throw invalidArgument(what);
-    };
-    need(limits.distance > 0 && std::isfinite(limits.distance), "the distance must be positive");
-    for (float tolerance : limits.tolerances)
-        need(tolerance > 0 && std::isfinite(tolerance), "all tolerances must be positive");
-    need(limits.faceKinds.empty() || limits.faceKinds.size() == source.faceCount(),
-         "there must be a kind per face");
-    need(limits.keptEdges.empty() || limits.keptEdges.size() == source.cornerCount(),
-         "there must be a mark per corner");
-    need(limits.values.size() == source.cornerCount() * limits.tolerances.size(),
-         "there must be as many values per corner as tolerances");
-    need(std::all_of(limits.values.begin(), limits.values.end(),
-                     [](float value) { return std::isfinite(value); }),
-         "all values must be finite");
-}
-
 }  // namespace
 
 SimplifiedMesh simplify(const Mesh& source, const SimplificationLimits& limits) {
-    check(source, limits);
     // Its messages are of no use to the caller. Several threads may simplify at once.
     static const bool isQuiet = (omerr().disable(), true);
     static_cast<void>(isQuiet);
