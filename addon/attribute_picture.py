@@ -26,9 +26,14 @@ MAX_WIDTH, MAX_HEIGHT = 960, 720
 GREY = (0.18, 0.18, 0.18)
 
 
-def render(context: bpy.types.Context, baked: Collection[str], attribute: str, path: Path) -> None:
-    """Renders the attribute of the baked objects, which are given by name."""
+def render(context: bpy.types.Context, baked: Collection[str], attribute: str, path: Path,
+           size: tuple[int, int] | None = None) -> None:
+    """Renders the attribute of the baked objects, which are given by name. size: width and height
+    of the picture, pixels; None: those of the scene, within MAX_WIDTH and MAX_HEIGHT."""
     scene = context.scene
+    if size is not None:
+        scene.render.resolution_x, scene.render.resolution_y = size
+        scene.render.resolution_percentage = 100
     if context.mode != 'OBJECT':
         # The attributes of a mesh in Edit Mode have no data.
         bpy.ops.object.mode_set(mode='OBJECT')

@@ -244,7 +244,7 @@ def test_shape_keys_below_modifiers_are_named(cube_on_plane):
     report = bake()
     assert [str(warning) for warning in report.warnings if "shape keys" in str(warning)] == [
         '"Plane (Radiosity)" has no shape keys, which "Plane" has: they cannot be carried over to '
-        'more vertices']
+        'other vertices']
 
 
 def test_modifiers_that_copy_faces_are_no_matter(cube_on_plane):

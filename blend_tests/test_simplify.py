@@ -102,7 +102,8 @@ def test_even_light_needs_the_corners_alone(new_object, new_world):
     new_world((1.0, 1.0, 1.0))
     steps = np.linspace(0.0, 1.0, 9)
     item = new_object("Square", [(x, y, 0.0) for y in steps for x in steps],
-                      [(k, k + 1, k + 10, k + 9) for y in range(8) for k in range(9 * y, 9 * y + 8)])
+                      [(k, k + 1, k + 10, k + 9) for y in range(8)
+                       for k in range(9 * y, 9 * y + 8)])
     report = bake()
     copy = copy_of(item)
     assert len(copy.data.vertices) == 4 and len(copy.data.polygons) == 2

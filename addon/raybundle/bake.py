@@ -88,7 +88,8 @@ def bake(context: bpy.types.Context, progress: Progress | None = None,
 def prepare(context: bpy.types.Context, overrides: dict[str, object], is_draft: bool = False
             ) -> PreparedBake:
     """Exports the context's scene, in Object Mode. is_draft: the library's setting `draft`. A draft
-    of adapted or simplified meshes keeps those that there are. overrides, and errors: as in bake()."""
+    of adapted or simplified meshes keeps those that there are. overrides, and errors: as in
+    bake()."""
     started = time.perf_counter()
     scene = context.scene
     settings = _read_settings(scene, overrides)

@@ -100,9 +100,9 @@ def _carry_edges(source: bpy.types.Mesh, mesh: bpy.types.Mesh, finer: FinerMesh)
             mesh.edges.foreach_set(name, carried)
 
 
-def edge_values(source: bpy.types.Mesh, finer: FinerMesh) -> np.ndarray:
-    """Returns per corner of the finer mesh and property whether the edge from it to the next corner
-    has the property, such as a seam or a crease, (c, properties)."""
+def marked_edges(source: bpy.types.Mesh, finer: FinerMesh) -> np.ndarray:
+    """Returns per corner of the finer mesh, (c,), whether the edge from it to the next corner has
+    any property of its own, such as a seam or a crease."""
     values = [read(source.edges, name, dtype) != 0 for name, dtype in _OF_EDGES.items()
               if name in bpy.types.MeshEdge.bl_rna.properties]
     for attribute in source.attributes:
@@ -111,11 +111,11 @@ def edge_values(source: bpy.types.Mesh, finer: FinerMesh) -> np.ndarray:
             name, dtype, width, _ = _TYPES[attribute.data_type]
             values.append(read(attribute.data, name, dtype, width).reshape(
                 len(source.edges), -1).any(axis=1))
-    found = np.zeros((finer.data.corner_count, len(values)), bool)
+    found = np.zeros(finer.data.corner_count, bool)
     if finer.source_edges is not None and values:
         on_edge = finer.source_edges >= 0
         of_corners = read(source.loops, 'edge_index', np.int32)
-        found[on_edge] = np.column_stack(values)[of_corners[finer.source_edges[on_edge]]]
+        found[on_edge] = np.any(values, axis=0)[of_corners[finer.source_edges[on_edge]]]
     return found
 
 

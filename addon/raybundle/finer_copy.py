@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Copies of objects that have finer meshes (topologies 'SUBDIVIDE' and 'ADAPTIVE').
+"""Copies of objects that have finer meshes (topologies 'SUBDIVIDE' and 'ADAPTIVE'), or simplified
+ones.
 
 The copy "<name> (Radiosity)" is shown instead of the original, which is hidden. The copy's property
 raybundle.source is the original, so that the next bake replaces the copy and Clear removes it.
@@ -17,6 +18,10 @@ from .finer_mesh import FinerMesh
 from .messages import Message, quoted
 
 NAME_SUFFIX = " (Radiosity)"
+
+_Meshes = dict[bpy.types.Object, FinerMesh]  # by original object
+# Returns the meshes of copies, of the evaluated meshes of the originals and the finer meshes.
+Change = Callable[[dict[bpy.types.Object, bpy.types.Mesh], _Meshes], _Meshes]
 
 
 def find_copies(scene: bpy.types.Scene) -> dict[bpy.types.Object, bpy.types.Object]:
@@ -38,11 +43,6 @@ def originals_shown(scene: bpy.types.Scene) -> Iterator[None]:
     finally:
         for item, hide_viewport, hide_render in states:
             item.hide_viewport, item.hide_render = hide_viewport, hide_render
-
-
-_Meshes = dict[bpy.types.Object, FinerMesh]  # by original object
-# Returns the meshes of copies, of the evaluated meshes of the originals and the finer meshes.
-Change = Callable[[dict[bpy.types.Object, bpy.types.Mesh], _Meshes], _Meshes]
 
 
 def create_copies(context: bpy.types.Context, meshes: _Meshes, change: Change | None = None
@@ -71,7 +71,7 @@ def create_copies(context: bpy.types.Context, meshes: _Meshes, change: Change | 
             missing.append("shape keys")
         if missing:
             warnings.append(Message(
-                "{copy} has no {what}, which {original} has: they cannot be carried over to more "
+                "{copy} has no {what}, which {original} has: they cannot be carried over to other "
                 "vertices", copy=quoted(copy.name), what=", ".join(missing),
                 original=quoted(original.name)))
         copies[original] = copy

@@ -84,7 +84,8 @@ def adapted(mesh: MeshData, finer: AdaptedMesh) -> FinerMesh:
     """Returns the mesh that the native library has adapted to the light. mesh: its source."""
     return _with_attributes(
         FinerMesh(mesh, finer.source_faces, finer.source_corners, finer.source_weights,
-                  mesh.corner_count, len(mesh.vertices), finer.source_edges, has_source_vertices=True),
+                  mesh.corner_count, len(mesh.vertices), finer.source_edges,
+                  has_source_vertices=True),
         finer.vertices, finer.corner_vertices, finer.face_offsets)
 
 

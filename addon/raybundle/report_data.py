@@ -71,13 +71,14 @@ def noisiest_object(report: dict) -> tuple[float, str] | None:
     return max(noises) if len(noises) > 1 else None
 
 
-def mesh_errors(report: dict) -> list[tuple[str, float, int, int]]:
-    """Returns each baked object's name, the error that its mesh causes, relative to its own light,
-    its number of vertices, and that with the topology ADAPTIVE, 0 if they were not counted. The
-    objects with the largest error come first."""
+def coarse_objects(report: dict, least: float) -> list[tuple[str, float, int, int]]:
+    """Returns each baked object whose mesh causes a larger error than `least`, relative to the
+    object's own light: its name, this error, its number of vertices, and that with the topology
+    ADAPTIVE, 0 if they were not counted. The objects with the largest error come first."""
     found = [(item['name'], item['error']['mesh'], item.get('vertices', 0),
               item.get('adaptive_vertices', 0))
-             for item in report.get('objects', []) if item.get('error')]
+             for item in report.get('objects', [])
+             if item.get('error') and item['error'].get('mesh', 0.0) > least]
     return sorted(found, key=lambda item: (-item[1], item[0]))
 
 

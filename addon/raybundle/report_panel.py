@@ -9,7 +9,7 @@ from bpy.app.translations import pgettext_iface as iface_
 
 from .library_messages import recognised
 from .messages import translated
-from .report_data import (Line, as_message, left_out_objects, mesh_errors, noisiest_object,
+from .report_data import (Line, as_message, coarse_objects, left_out_objects, noisiest_object,
                           read_report, time_text, warning_lines)
 from .report_remedies import (advice_text, advised_settings, exist, is_about_error, is_about_side,
                               is_applied)
@@ -117,9 +117,8 @@ def _draw_remedies(layout: bpy.types.UILayout, context: bpy.types.Context, line:
 
 
 def _coarse_objects(scene: bpy.types.Scene) -> list[tuple[str, float, int, int]]:
-    """Returns those of mesh_errors() whose error is larger than the noise that is aimed for."""
-    return [item for item in mesh_errors(read_report(scene))
-            if item[1] > scene.raybundle.target_error]
+    """Returns those whose error is larger than the noise that is aimed for."""
+    return coarse_objects(read_report(scene), scene.raybundle.target_error)
 
 
 class RAYBUNDLE_PT_mesh_error(_LastBakePanel, bpy.types.Panel):
@@ -145,10 +144,7 @@ class RAYBUNDLE_PT_mesh_error(_LastBakePanel, bpy.types.Panel):
             row.label(text=f"{vertices:,} \N{RIGHTWARDS ARROW} {adaptive:,}"
                       if adaptive > vertices else f"{vertices:,}", icon='VERTEXSEL',
                       translate=False)
-            row = row.row(align=True)
-            row.enabled = exist('object', [name])
-            row.operator("raybundle.select_named", text="",
-                         icon='RESTRICT_SELECT_OFF').object_name = name
+            _draw_select(row, name)
         _draw_rest(self.layout, len(objects))
         row = self.layout.row(align=True)
         row.prop_enum(settings, "topology", 'ADAPTIVE')
@@ -171,11 +167,16 @@ class RAYBUNDLE_PT_left_out(_LastBakePanel, bpy.types.Panel):
             row = self.layout.row(align=True)
             draw_wrapped(row.column(), context,
                          f"{name}: {translated(as_message(report, reason))}", indent=32.0)
-            button = row.row(align=True)
-            button.enabled = exist('object', [name])
-            button.operator("raybundle.select_named", text="",
-                            icon='RESTRICT_SELECT_OFF').object_name = name
+            _draw_select(row, name)
         _draw_rest(self.layout, len(objects))
+
+
+def _draw_select(row: bpy.types.UILayout, name: str) -> None:
+    """Draws the button that selects an object, which may have been deleted since the bake."""
+    button = row.row(align=True)
+    button.enabled = exist('object', [name])
+    button.operator("raybundle.select_named", text="",
+                    icon='RESTRICT_SELECT_OFF').object_name = name
 
 
 def _draw_rest(layout: bpy.types.UILayout, count: int) -> None:

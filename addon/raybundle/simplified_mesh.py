@@ -10,7 +10,7 @@ from dataclasses import dataclass, field, replace
 import bpy
 import numpy as np
 
-from .carried_attributes import edge_values
+from .carried_attributes import marked_edges
 from .finer_mesh import FinerMesh
 from .mesh_arrays import read
 from .native import Simplification
@@ -72,7 +72,7 @@ class Simplifier:
         scale = abs(original.matrix_world.to_3x3().determinant()) ** (2 / 3)
         self.areas[original] = float(scale * read(source.polygons, 'area', np.float32).sum())
         return (data.vertices, data.corner_vertices, data.face_offsets, kinds.ravel(),
-                edge_values(source, finer).any(axis=1), np.concatenate(values, axis=1),
+                marked_edges(source, finer), np.concatenate(values, axis=1),
                 np.maximum(np.concatenate(tolerances), _LEAST),
                 max(_DISTANCE * self.target_error * extent, _LEAST))
 

@@ -26,7 +26,7 @@ from build import cube_on_plane  # noqa: E402
 from mesh_edges import add_edges  # noqa: E402
 
 ATTRIBUTE = "Radiosity"
-WIDTH, HEIGHT = 400, 340  # pixels
+SIZE = 400, 340  # width and height, pixels
 EDGE = 0.012  # m
 
 
@@ -40,9 +40,7 @@ def draw(topology: str, path: Path) -> None:
           f"stated error {100 * report.error['total']:.1f} %")
     for name in baked:
         add_edges(bpy.data.objects[name], EDGE)
-    render = bpy.context.scene.render
-    render.resolution_x, render.resolution_y, render.resolution_percentage = WIDTH, HEIGHT, 100
-    attribute_picture.render(bpy.context, baked, ATTRIBUTE, path)
+    attribute_picture.render(bpy.context, baked, ATTRIBUTE, path, SIZE)
 
 
 def main(out: Path) -> None:

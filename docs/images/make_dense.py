@@ -31,7 +31,7 @@ from raybundle.bake_run import BakeRun  # noqa: E402
 from raybundle.messages import Message  # noqa: E402
 
 ATTRIBUTE = "Radiosity"
-WIDTH, HEIGHT = 400, 340  # pixels
+SIZE = 400, 340  # width and height, pixels
 EDGE = 0.004  # m
 
 
@@ -55,9 +55,7 @@ def build(is_smooth: bool) -> bpy.types.Object:
 
 
 def draw(baked: list[str], path: Path) -> None:
-    render = bpy.context.scene.render
-    render.resolution_x, render.resolution_y, render.resolution_percentage = WIDTH, HEIGHT, 100
-    attribute_picture.render(bpy.context, baked, ATTRIBUTE, path)
+    attribute_picture.render(bpy.context, baked, ATTRIBUTE, path, SIZE)
 
 
 def draw_clusters(path: Path) -> None:

@@ -25,7 +25,7 @@ import raybundle  # noqa: E402
 from mesh_edges import add_edges  # noqa: E402
 
 ATTRIBUTE = "Radiosity"
-WIDTH, HEIGHT = 300, 300  # pixels
+SIZE = 300, 300  # width and height, pixels
 EDGE = 0.006  # m
 
 
@@ -39,9 +39,7 @@ def draw(simplify: bool, with_edges: bool, path: Path) -> None:
     if with_edges:
         for name in baked:
             add_edges(bpy.data.objects[name], EDGE)
-    render = bpy.context.scene.render
-    render.resolution_x, render.resolution_y, render.resolution_percentage = WIDTH, HEIGHT, 100
-    attribute_picture.render(bpy.context, baked, ATTRIBUTE, path)
+    attribute_picture.render(bpy.context, baked, ATTRIBUTE, path, SIZE)
 
 
 def main(out: Path) -> None:

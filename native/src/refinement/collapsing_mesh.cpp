@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "refinement/collapsing_mesh.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 
@@ -72,7 +73,7 @@ void CollapsingMesh::keepWhatCannotBeStored() {
             const int32_t a = source.cornerVertices[size_t(t.corner[k])],
                           b = source.cornerVertices[size_t(t.corner[(k + 1) % 3])];
             if (a == b) isKept[size_t(t.face)] = true;
-            uses.push_back({pairKey(a, b), a < b, t.face});
+            uses.push_back({edgeKey(a, b), a < b, t.face});
         }
     std::sort(uses.begin(), uses.end(), [](const Use& a, const Use& b) { return a.key < b.key; });
     for (size_t k = 0, end; k < uses.size(); k = end) {
@@ -185,7 +186,7 @@ void CollapsingMesh::findFeatures() {
             isOne = isOne || kind[0] != kind[1] || differ(corners[0][0], corners[1][0]) ||
                     differ(corners[0][1], corners[1][1]);
         if (!isOne) continue;
-        features[pairKey(a, b)] = beginsAt;
+        features[edgeKey(a, b)] = beginsAt;
         ++featureCounts[size_t(a)];
         ++featureCounts[size_t(b)];
     }

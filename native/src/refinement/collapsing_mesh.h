@@ -5,7 +5,6 @@
 #pragma once
 
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
-#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
@@ -37,11 +36,7 @@ class CollapsingMesh {
     // object. Throws Error with INVALID_ARGUMENT if the limits do not fit the mesh.
     CollapsingMesh(const Mesh& source, const SimplificationLimits& limits);
 
-    // Returns a key of two vertices, whatever their order.
-    static uint64_t pairKey(int32_t a, int32_t b) {
-        return uint64_t(uint32_t(std::min(a, b))) << 32 | uint32_t(std::max(a, b));
-    }
-    bool isFeature(int32_t a, int32_t b) const { return features.count(pairKey(a, b)) > 0; }
+    bool isFeature(int32_t a, int32_t b) const { return features.count(edgeKey(a, b)) > 0; }
     // Return the position of a corner of the source, or of three, m.
     glm::dvec3 positionOf(int32_t corner) const {
         return source.vertices[size_t(source.cornerVertices[size_t(corner)])];
@@ -55,7 +50,7 @@ class CollapsingMesh {
     std::vector<int32_t> triangleOf;     // per face of `mesh`
     std::vector<uint8_t> isLocked;       // per vertex of `mesh`: whether it stays
     std::vector<int32_t> featureCounts;  // per vertex of `mesh`: features that end there
-    // Pairs of vertices of `mesh` with a feature between them: the corner of the source at which an
+    // By edgeKey() of vertices of `mesh` with a feature between them: the corner of the source at which an
     // edge of the source begins that lies on it.
     std::unordered_map<uint64_t, int32_t> features;
     float extent = 0;  // the largest of the mesh along an axis, m

@@ -15,7 +15,6 @@ namespace {
 using Triangle = CollapsingTriangle;
 using VertexHandle = CollapsingMesh::Mesh3::VertexHandle;
 using HalfedgeHandle = CollapsingMesh::Mesh3::HalfedgeHandle;
-constexpr auto pairKey = CollapsingMesh::pairKey;
 
 // Least cosine between the normals of a triangle before and after a collapse.
 constexpr double kLeastTurn = 0.5;
@@ -49,6 +48,7 @@ glm::dvec3 nearestIn(const std::array<glm::dvec3, 3>& t, const glm::dvec3& p) {
     return glm::dvec3(va, vb, vc) / (va + vb + vc);
 }
 
+// Returns the height of a triangle over its longest edge.
 double shapeOf(const std::array<glm::dvec3, 3>& t) {
     const double across = glm::length(glm::cross(t[1] - t[0], t[2] - t[0]));
     const double longest =
@@ -217,7 +217,8 @@ float Simplifier::changeOn(const Side& side, int32_t vertex, bool all) {
         if (glm::dot(was, is) < kLeastTurn * glm::length(was) * glm::length(is)) return -1;
     }
     for (const auto& t : after)
-        if (!(shapeOf(t) >= std::min(kThin, thinnest)) || shapeOf(t) <= 0) return -1;
+        if (const double shape = shapeOf(t); shape <= 0 || shape < std::min(kThin, thinnest))
+            return -1;
     float most = 0;
     auto test = [&](int32_t corner) {
         const Place place = nearest(after, surface.positionOf(corner));
@@ -276,10 +277,10 @@ void Simplifier::collapse(HalfedgeHandle edge) {
         int32_t next = -1;
         for (const auto other : mesh.vv_range(VertexHandle(v0)))
             if (other.idx() != v1 && surface.isFeature(v0, other.idx())) next = other.idx();
-        const int32_t beginsAt = surface.features[pairKey(v0, next)];
-        surface.features.erase(pairKey(v0, next));
-        surface.features.erase(pairKey(v0, v1));
-        surface.features[pairKey(v1, next)] = beginsAt;
+        const int32_t beginsAt = surface.features[edgeKey(v0, next)];
+        surface.features.erase(edgeKey(v0, next));
+        surface.features.erase(edgeKey(v0, v1));
+        surface.features[edgeKey(v1, next)] = beginsAt;
     }
     for (const Side& side : sides) {
         if (side.changing.empty()) continue;
@@ -339,9 +340,9 @@ SimplifiedMesh Simplifier::result() const {
         made.sourceFaces.push_back(face);
     };
     for (size_t f = 0; f < ofFace.size(); ++f) {
-        const bool isWhole = std::none_of(
-            ofFace[f].begin(), ofFace[f].end(),
-            [](const Triangle* t) { return t->isChanged || t->isRemoved || !t->removed.empty(); });
+        const bool isWhole =
+            std::none_of(ofFace[f].begin(), ofFace[f].end(),
+                         [](const Triangle* t) { return t->isChanged || t->isRemoved; });
         if (isWhole) {
             std::vector<int32_t> corners(size_t(source.faceOffsets[f + 1] - source.faceOffsets[f]));
             std::iota(corners.begin(), corners.end(), source.faceOffsets[f]);
@@ -353,7 +354,7 @@ SimplifiedMesh Simplifier::result() const {
             std::array<int32_t, 3> edges;
             for (size_t k = 0; k < 3; ++k) {
                 const auto feature =
-                    surface.features.find(pairKey(t->vertex[k], t->vertex[(k + 1) % 3]));
+                    surface.features.find(edgeKey(t->vertex[k], t->vertex[(k + 1) % 3]));
                 edges[k] = feature == surface.features.end() ? -1 : feature->second;
             }
             addFace(int32_t(f), t->corner, edges);
