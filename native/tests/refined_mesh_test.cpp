@@ -281,6 +281,92 @@ TEST(RefinedMesh, PointsStayInTheirTriangles) {
     EXPECT_EQ(found.size(), 500u);
 }
 
+// Returns lines between random points of the faces of a mesh, in the world.
+std::vector<RefinedMesh::Line> randomLines(const Mesh& mesh, const glm::dmat4& toWorld, int count,
+                                           double accuracy, std::mt19937& random) {
+    std::uniform_real_distribution<double> share(0, 1);
+    auto pointOn = [&](const std::vector<glm::dvec3>& face) {
+        double sum = 0;
+        glm::dvec3 point(0.0);
+        for (const glm::dvec3& corner : face) {
+            // Corners and edges are as likely as the inside.
+            const double weight = share(random) < 0.5 ? 0 : share(random);
+            point += weight * corner;
+            sum += weight;
+        }
+        return glm::dvec3(toWorld * glm::dvec4(sum > 0 ? point / sum : face[0], 1));
+    };
+    std::vector<RefinedMesh::Line> lines;
+    for (int k = 0; k < count; ++k) {
+        RefinedMesh::Line line;
+        line.face = int32_t(random() % uint32_t(mesh.faceCount()));
+        line.accuracy = accuracy;
+        const std::vector<glm::dvec3> face = faceOf(mesh, size_t(line.face));
+        for (int p = 0; p < 2 + k % 3; ++p) line.points.push_back(pointOn(face));
+        lines.push_back(line);
+    }
+    return lines;
+}
+
+TEST(RefinedMesh, LinesBecomeEdges) {
+    const Mesh plane = rectangle("plane", {-3, -2, 0}, {6, 0, 0}, {0, 4, 0});
+    RefinedMesh refined(plane, kTurned);
+    std::vector<glm::dvec3> corners{{-2.9, -1, 0}, {1.3, -1.4, 0}, {2, 1.1, 0}, {-0.7, 0.9, 0}};
+    double length = 0;
+    for (size_t k = 1; k < corners.size(); ++k) length += glm::distance(corners[k - 1], corners[k]);
+    for (glm::dvec3& corner : corners) corner = kTurned * glm::dvec4(corner, 1);
+    refined.addLines({{0, corners, 1e-3}}, SIZE_MAX);
+    auto shown = [&] {
+        double sum = 0;
+        const Mesh mesh = refined.result().withAttributesOf(plane);
+        for (const uint64_t key : mesh.sharpEdges)
+            sum += double(glm::distance(mesh.vertices[size_t(key >> 32)],
+                                        mesh.vertices[size_t(key & 0xffffffffu)]));
+        return sum;
+    };
+    EXPECT_NEAR(shown(), length, 1e-5);
+    EXPECT_LT(refined.vertexCount(), 12u);
+    expectSame(plane, refined.result());
+    refineAlong(refined, wave, 8);
+    EXPECT_NEAR(shown(), length, 1e-5);
+    expectSame(plane, refined.result());
+}
+
+// Lines are given up where they meet each other, or an edge of the source, at a small angle. Random
+// lines are a harder test than shadows: they run close beside edges. Few angles then stay small.
+TEST(RefinedMesh, LinesLeaveFewSmallAngles) {
+    std::mt19937 random(5);
+    for (const Mesh& mesh : {rectangle("plane", {-3, -2, 0}, {6, 0, 0}, {0, 4, 0}),
+                             box("cube", {0, 0, 0}, {1, 1.3f, 1.7f}, false)}) {
+        size_t small = 0, all = 0;
+        for (int trial = 0; trial < 20; ++trial) {
+            RefinedMesh refined(mesh, kTurned);
+            refined.addLines(randomLines(mesh, kTurned, 6, 0.02, random), SIZE_MAX);
+            refined.improve(1 << 20);
+            refineAlong(refined, wave, 4);
+            expectSame(mesh, refined.result());
+            const Mesh result = refined.result().withAttributesOf(mesh);
+            for (size_t f = 0; f < result.faceCount(); ++f)
+                small += smallestAngle(faceOf(result, f)) < 20;
+            all += result.faceCount();
+        }
+        std::printf("[ figures  ] %s: %zu of %zu triangles\n", mesh.name.c_str(), small, all);
+        EXPECT_LT(double(small), 0.05 * double(all)) << mesh.name;
+    }
+}
+
+TEST(RefinedMesh, LinesKeepTheLimitOfVertices) {
+    const Mesh plane = rectangle("plane", {-3, -2, 0}, {6, 0, 0}, {0, 4, 0});
+    std::mt19937 random(5);
+    const std::vector<RefinedMesh::Line> lines = randomLines(plane, kTurned, 30, 0.01, random);
+    for (size_t most : {4, 5, 9, 10, 30}) {
+        RefinedMesh refined(plane, kTurned);
+        refined.addLines(lines, most);
+        EXPECT_LE(refined.vertexCount(), most);
+        EXPECT_GE(refined.vertexCount() + 1, most);
+    }
+}
+
 TEST(RefinedMesh, AnyMeshSurvives) {
     std::mt19937 random(7);
     for (int trial = 0; trial < 200; ++trial) {
@@ -298,6 +384,8 @@ TEST(RefinedMesh, AnyMeshSurvives) {
         }
         const Mesh mesh = polygons("any", vertices, faces);
         RefinedMesh refined(mesh, kTurned);
+        if (trial % 2)
+            refined.addLines(randomLines(mesh, kTurned, 5, 0.01 * (1 + number(3)), random), 5000);
         for (int round = 0; round < 4; ++round) {
             const size_t triangles = refined.triangles().size();
             for (uint32_t t = 0; t < triangles; ++t)

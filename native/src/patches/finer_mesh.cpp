@@ -16,6 +16,7 @@ FinerMesh FinerMesh::of(const Mesh& source) {
         mesh.sourceCorners.push_back({c, c, c});
         mesh.sourceWeights.push_back({1, 0, 0});
         mesh.sourceEdges.push_back(c);
+        mesh.isAbrupt.push_back(0);
     }
     return mesh;
 }
@@ -40,18 +41,18 @@ Mesh FinerMesh::withAttributesOf(const Mesh& source) const {
         if (!source.cornerColors.empty())
             mesh.cornerColors.push_back(interpolate(c, source.cornerColors));
     }
-    if (source.sharpEdges.empty()) return mesh;
+    auto isSharp = [&](int32_t face, int32_t from) {
+        const int32_t end = source.faceOffsets[size_t(face) + 1];
+        const int32_t to = from + 1 == end ? source.faceOffsets[size_t(face)] : from + 1;
+        return std::binary_search(
+            source.sharpEdges.begin(), source.sharpEdges.end(),
+            edgeKey(source.cornerVertices[size_t(from)], source.cornerVertices[size_t(to)]));
+    };
     for (size_t f = 0; f < faceCount(); ++f) {
         const int32_t begin = faceOffsets[f], end = faceOffsets[f + 1];
-        const size_t face = size_t(sourceFaces[f]);
         for (int32_t c = begin; c < end; ++c) {
             const int32_t from = sourceEdges[size_t(c)];
-            if (from < 0) continue;
-            const int32_t to =
-                from + 1 == source.faceOffsets[face + 1] ? source.faceOffsets[face] : from + 1;
-            if (std::binary_search(source.sharpEdges.begin(), source.sharpEdges.end(),
-                                   edgeKey(source.cornerVertices[size_t(from)],
-                                           source.cornerVertices[size_t(to)])))
+            if (isAbrupt[size_t(c)] || (from >= 0 && isSharp(sourceFaces[f], from)))
                 mesh.sharpEdges.push_back(
                     edgeKey(cornerVertices[size_t(c)],
                             cornerVertices[size_t(c + 1 == end ? begin : c + 1)]));

@@ -23,6 +23,8 @@ struct FinerMesh {
     // Per corner: if the edge from it to the next corner lies on an edge of the source, the corner
     // of the source at which that edge begins, in the order of the source's face. Otherwise -1.
     std::vector<int32_t> sourceEdges;
+    // Per corner: whether the light jumps across the edge from it to the next corner.
+    std::vector<uint8_t> isAbrupt;
     size_t sourceCornerCount = 0;
 
     // Returns the mesh whose faces are those of the source.
@@ -39,7 +41,8 @@ struct FinerMesh {
             sum += sourceWeights[corner][k] * values[size_t(sourceCorners[corner][k])];
         return sum;
     }
-    // Returns the mesh with the name and the interpolated attributes of its source.
+    // Returns the mesh with the name and the interpolated attributes of its source. Edges across
+    // which the light jumps count as sharp.
     Mesh withAttributesOf(const Mesh& source) const;
 };
 

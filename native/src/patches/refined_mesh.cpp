@@ -279,9 +279,10 @@ FinerMesh RefinedMesh::result() const {
     FinerMesh mesh;
     mesh.sourceCornerCount = source.cornerCount();
     for (const Vertex& vertex : vertices) mesh.vertices.emplace_back(vertex.position);
-    auto addCorner = [&](uint32_t vertex, int32_t sourceEdge) {
+    auto addCorner = [&](uint32_t vertex, int32_t sourceEdge, bool isAbrupt) {
         mesh.cornerVertices.push_back(int32_t(vertex));
         mesh.sourceEdges.push_back(sourceEdge);
+        mesh.isAbrupt.push_back(isAbrupt);
         mesh.sourceCorners.emplace_back();
         mesh.sourceWeights.emplace_back();
     };
@@ -298,7 +299,7 @@ FinerMesh RefinedMesh::result() const {
                       end = source.faceOffsets[size_t(f) + 1];
         if (!isTouched[size_t(f)]) {
             for (int32_t c = begin; c < end; ++c) {
-                addCorner(uint32_t(source.cornerVertices[size_t(c)]), c);
+                addCorner(uint32_t(source.cornerVertices[size_t(c)]), c, false);
                 mesh.sourceCorners.back() = {c, c, c};
                 mesh.sourceWeights.back() = {1, 0, 0};
             }
@@ -310,7 +311,7 @@ FinerMesh RefinedMesh::result() const {
             cornerOf.emplace(uint32_t(source.cornerVertices[size_t(c)]), c);
         for (uint32_t t : living[size_t(f)]) {
             for (size_t k = 0; k < 3; ++k) {
-                addCorner(all[t].vertex[k], all[t].sourceEdge[k]);
+                addCorner(all[t].vertex[k], all[t].sourceEdge[k], all[t].isAbrupt[k]);
                 if (const auto own = cornerOf.find(all[t].vertex[k]); own != cornerOf.end()) {
                     mesh.sourceCorners.back() = {own->second, own->second, own->second};
                     mesh.sourceWeights.back() = {1, 0, 0};

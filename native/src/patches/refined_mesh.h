@@ -19,6 +19,8 @@
 //   that are more than kThin times as long as wide, whose good triangles would be too many.
 // - Faces in the same place as another are divided as it is, so that they can still be recognised
 //   as its doubles. Their edges are not flipped.
+// - Lines on faces, across which values jump, become edges: Chew, "Constrained Delaunay
+//   Triangulations" (1989). Where such an edge would leave an angle too small, it is given up.
 // - Faces that no bisection has reached keep their polygons.
 // CGAL's Mesh_2, which refines one plane at a time, cannot be used: it divides the border of one
 // plane without that of the next.
@@ -27,6 +29,7 @@
 #include <array>
 #include <cstdint>
 #include <glm/glm.hpp>
+#include <optional>
 #include <vector>
 
 #include "patches/finer_mesh.h"
@@ -38,6 +41,13 @@ namespace raybundle {
 // flipped are replaced by new ones.
 class RefinedMesh {
   public:
+    // A line on a face of the source, across which values jump.
+    struct Line {
+        int32_t face = 0;
+        std::vector<glm::dvec3> points;  // in the world, m
+        double accuracy = 0;  // points that are nearer to a vertex or to an edge lie on it, m
+    };
+
     // Triangulates the faces of `source`, which must outlive the object. `toWorld` maps its
     // vertices to the space in which lengths and angles are measured and points are given, m.
     RefinedMesh(const Mesh& source, const glm::dmat4& toWorld);
@@ -48,6 +58,8 @@ class RefinedMesh {
         // Per edge, from corner k to the next: the corner of the source at which the source's edge
         // begins that contains it, or -1 if it lies within the source's face.
         std::array<int32_t, 3> sourceEdge;
+        // Per edge: whether values jump across it, because a line lies on it.
+        std::array<bool, 3> isAbrupt{};
         // Per edge: the next in the ring of all edges between the same two places, as 3 * triangle
         // + k. An edge that no other triangle has refers to itself.
         std::array<uint32_t, 3> ring;
@@ -55,6 +67,10 @@ class RefinedMesh {
         bool isAlive = true;
         std::vector<uint32_t> points;  // those of addPoint() that lie in the triangle
     };
+    // Returns whether an edge is one of the source's, or lies on a line. It is never flipped.
+    static bool isFixed(const Triangle& triangle, size_t edge) {
+        return triangle.sourceEdge[edge] >= 0 || triangle.isAbrupt[edge];
+    }
     // All triangles that have ever existed.
     const std::vector<Triangle>& triangles() const { return all; }
     // Returns the position of a corner of a triangle in the world, m.
@@ -65,8 +81,16 @@ class RefinedMesh {
     double area(const Triangle& triangle) const;
     // Returns the length of the longest edge of a triangle in the world, m.
     double longestEdge(const Triangle& triangle) const;
+    // Returns the smallest barycentric coordinate of a point (m, in the world) in a triangle.
+    double smallestShare(const Triangle& triangle, const glm::dvec3& point) const;
+    // Returns all edges between the places of an edge, from the edge on, as 3 * triangle + k.
+    std::vector<uint32_t> ringOf(uint32_t edge) const;
     // Returns the number of vertices of the result.
     size_t vertexCount() const { return vertices.size(); }
+
+    // Makes lines edges of the triangles, as long as the result has at most `mostVertices`
+    // vertices. Faces in the same place as others get none.
+    void addLines(const std::vector<Line>& lines, size_t mostVertices);
 
     // Adds a point in a triangle (m, in the world) and returns its index, which counts from 0. It
     // is handed on to the triangles that replace the triangle.
@@ -108,6 +132,8 @@ class RefinedMesh {
     // Notes the shortest edges of the faces, of the triangles from `firstTriangle` on.
     void noteShortestEdges(size_t firstTriangle);
     glm::dvec3 areaVector(const Triangle& triangle) const;
+    // Returns the barycentric coordinates of a point.
+    glm::dvec3 sharesAt(const Triangle& triangle, const glm::dvec3& point) const;
     double edgeLength2(const Triangle& triangle, size_t edge) const;
     // Returns the longest edge of a triangle, 0 to 2. Among equal edges it is the same one for all
     // triangles that have them.
@@ -118,12 +144,27 @@ class RefinedMesh {
     };
     Angle smallestAngle(const Triangle& triangle) const;
     bool isPoor(const Triangle& triangle) const;
+    // Returns whether an edge of a triangle is shorter than a share of the shortest that its face
+    // has without improvements.
+    bool isTooShort(const Triangle& triangle, double share) const;
     uint32_t add(const Triangle& triangle);
     void replaceInRing(uint32_t old, uint32_t now);
     void link(const std::vector<uint32_t>& edges);
-    std::vector<uint32_t> ringOf(uint32_t edge) const;
-    // Divides the triangles of a ring.
-    void bisect(const std::vector<uint32_t>& ring);
+    // Divides the triangles of a ring at a share of its first edge, from that edge's corner on.
+    void bisect(const std::vector<uint32_t>& ring, double share = 0.5);
+    // Divides a triangle at a point inside it, given by its barycentric coordinates.
+    void divide(uint32_t triangle, const glm::dvec3& shares);
+    class FaceTriangles;
+    // Returns the place at a point of a line, which is made if there is none. Empty if the point is
+    // not on the face.
+    std::optional<uint32_t> placeAt(const Line& line, const glm::dvec3& point,
+                                    FaceTriangles& triangles, size_t mostVertices);
+    // Makes edges of the straight line between two places, as far as this is possible.
+    void connect(const Line& line, uint32_t from, uint32_t to, FaceTriangles& triangles,
+                 size_t mostVertices);
+    // Lets edges of lines be flipped that form a small angle of the triangle with a fixed edge, or
+    // beside which the triangle has become too short. Returns whether there was one.
+    bool giveUpLine(uint32_t triangle);
     // Flips edges until those on the stack and all that their flips change are Delaunay's.
     void flipAll(std::vector<uint32_t> stack);
     bool flipIfBetter(uint32_t edge, std::vector<uint32_t>& stack);

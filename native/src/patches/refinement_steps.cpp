@@ -16,7 +16,7 @@ namespace {
 // stored as floats.
 const double kSmall = std::cos(glm::radians(20.3));
 // Edges are flipped only between triangles whose planes differ by less than this angle, radians.
-constexpr double kFlat = 1e-3;
+constexpr double kSamePlane = 1e-3;
 // Least gain of a flip, as the sine of the angle by which the sum of the two opposite angles
 // exceeds 180 degrees.
 constexpr double kLeastGain = 1e-7;
@@ -26,6 +26,8 @@ constexpr size_t kMostSteps = 30;
 // Triangles with a shorter edge than this are not improved: the share of the shortest edge that a
 // face has without improvements. It bounds what happens at small angles of the source.
 constexpr double kShortest = 0.3;
+// The same for triangles at lines, which are then given up.
+constexpr double kShortestLine = 0.7;
 
 }  // namespace
 
@@ -48,50 +50,60 @@ RefinedMesh::Angle RefinedMesh::smallestAngle(const Triangle& triangle) const {
     return result;
 }
 
-// Between two edges of the source, no bisection can enlarge an angle.
+bool RefinedMesh::isTooShort(const Triangle& triangle, double share) const {
+    const double least = share * shortest[size_t(triangle.face)];
+    for (size_t k = 0; k < 3; ++k)
+        if (edgeLength2(triangle, k) < least * least) return true;
+    return false;
+}
+
+// Between two fixed edges, no bisection can enlarge an angle.
 bool RefinedMesh::isPoor(const Triangle& triangle) const {
     const size_t face = size_t(triangle.face);
     if (!triangle.isAlive || !isTouched[face] || isThin[face] || hasDoubles[face]) return false;
     const auto [cosine, at] = smallestAngle(triangle);
     if (!(cosine > kSmall)) return false;
-    for (size_t k = 0; k < 3; ++k)
-        if (edgeLength2(triangle, k) < std::pow(kShortest * shortest[face], 2)) return false;
-    return triangle.sourceEdge[at] < 0 || triangle.sourceEdge[last(at)] < 0;
+    return !isTooShort(triangle, kShortest) &&
+           (!isFixed(triangle, at) || !isFixed(triangle, last(at)));
 }
 
-void RefinedMesh::bisect(const std::vector<uint32_t>& ring) {
+void RefinedMesh::bisect(const std::vector<uint32_t>& ring, double share) {
     const uint32_t edge = ring.front();
     const uint32_t end = all[edge / 3].place[edge % 3];  // the place at one end
     const uint32_t middle = uint32_t(places.size());
-    places.push_back(0.5 * (places[end] + places[all[edge / 3].place[next(edge % 3)]]));
+    places.push_back((1 - share) * places[end] +
+                     share * places[all[edge / 3].place[next(edge % 3)]]);
     std::map<std::array<uint32_t, 2>, uint32_t> vertexBetween;
     std::vector<uint32_t> atEnd, beyond, outer;
     for (uint32_t one : ring) {
         const Triangle old = all[one / 3];
         const size_t k = one % 3, b = next(k), c = last(k);
-        const std::array<uint32_t, 2> ends{std::min(old.vertex[k], old.vertex[b]),
-                                           std::max(old.vertex[k], old.vertex[b])};
+        const bool beginsAtEnd = old.place[k] == end;
+        const std::array<uint32_t, 2> ends{old.vertex[beginsAtEnd ? k : b],
+                                           old.vertex[beginsAtEnd ? b : k]};
         const auto [found, isNew] = vertexBetween.try_emplace(ends, uint32_t(vertices.size()));
         if (isNew)
             vertices.push_back(
-                {0.5 * (vertices[ends[0]].position + vertices[ends[1]].position), middle});
+                {(1 - share) * vertices[ends[0]].position + share * vertices[ends[1]].position,
+                 middle});
         const uint32_t vertex = found->second;
         Triangle half = old;
         half.points.clear();
         half.place = {old.place[k], middle, old.place[c]};
         half.vertex = {old.vertex[k], vertex, old.vertex[c]};
         half.sourceEdge = {old.sourceEdge[k], -1, old.sourceEdge[c]};
+        half.isAbrupt = {old.isAbrupt[k], false, old.isAbrupt[c]};
         const uint32_t first = add(half);
         half.place = {middle, old.place[b], old.place[c]};
         half.vertex = {vertex, old.vertex[b], old.vertex[c]};
         half.sourceEdge = {old.sourceEdge[k], old.sourceEdge[b], -1};
+        half.isAbrupt = {old.isAbrupt[k], old.isAbrupt[b], false};
         const uint32_t second = add(half);
         all[one / 3].isAlive = false;
         isTouched[size_t(old.face)] = 1;
         replaceInRing(3 * (one / 3) + uint32_t(c), 3 * first + 2);
         replaceInRing(3 * (one / 3) + uint32_t(b), 3 * second + 1);
         link({3 * first + 1, 3 * second + 2});
-        const bool beginsAtEnd = old.place[k] == end;
         (beginsAtEnd ? atEnd : beyond).push_back(3 * first);
         (beginsAtEnd ? beyond : atEnd).push_back(3 * second);
         outer.push_back(3 * first + 2);
@@ -125,7 +137,7 @@ bool RefinedMesh::flipIfBetter(uint32_t edge, std::vector<uint32_t>& stack) {
     if (other == edge || all[other / 3].ring[other % 3] != edge) return false;
     const size_t i = edge % 3, j = other % 3;
     const Triangle one = all[edge / 3], two = all[other / 3];
-    if (one.sourceEdge[i] >= 0 || one.face != two.face || one.vertex[i] != two.vertex[next(j)] ||
+    if (isFixed(one, i) || one.face != two.face || one.vertex[i] != two.vertex[next(j)] ||
         one.vertex[next(i)] != two.vertex[j] || one.place[last(i)] == two.place[last(j)])
         return false;
     const glm::dvec3 a = position(one, i), b = position(one, next(i)), c = position(one, last(i)),
@@ -138,7 +150,7 @@ bool RefinedMesh::flipIfBetter(uint32_t edge, std::vector<uint32_t>& stack) {
     // A triangle without area lies in any plane.
     auto isFlat = [&](const glm::dvec3& v) {
         return glm::dot(v, normal) >= 0 && glm::length(v - glm::dot(v, normal) * normal) <=
-                                               kFlat * glm::length(v) + 1e-9 * size;
+                                               kSamePlane * glm::length(v) + 1e-9 * size;
     };
     if (!isFlat(first) || !isFlat(second)) return false;
     auto sine = [](const glm::dvec3& u, const glm::dvec3& v) {
@@ -159,10 +171,12 @@ bool RefinedMesh::flipIfBetter(uint32_t edge, std::vector<uint32_t>& stack) {
     made.place = {one.place[i], two.place[last(j)], one.place[last(i)]};
     made.vertex = {one.vertex[i], two.vertex[last(j)], one.vertex[last(i)]};
     made.sourceEdge = {two.sourceEdge[next(j)], -1, one.sourceEdge[last(i)]};
+    made.isAbrupt = {two.isAbrupt[next(j)], false, one.isAbrupt[last(i)]};
     const uint32_t atA = add(made);
     made.place = {two.place[last(j)], one.place[next(i)], one.place[last(i)]};
     made.vertex = {two.vertex[last(j)], one.vertex[next(i)], one.vertex[last(i)]};
     made.sourceEdge = {two.sourceEdge[last(j)], one.sourceEdge[next(i)], -1};
+    made.isAbrupt = {two.isAbrupt[last(j)], one.isAbrupt[next(i)], false};
     const uint32_t atB = add(made);
     const uint32_t t = 3 * (edge / 3), u = 3 * (other / 3);
     replaceInRing(u + uint32_t(next(j)), 3 * atA);
@@ -206,12 +220,33 @@ void RefinedMesh::refine(uint32_t triangle, size_t mostVertices) {
     }
 }
 
+bool RefinedMesh::giveUpLine(uint32_t triangle) {
+    const Triangle& one = all[triangle];
+    const size_t face = size_t(one.face);
+    if (!one.isAlive || isThin[face]) return false;
+    const auto [cosine, at] = smallestAngle(one);
+    if (!(cosine > kSmall)) return false;
+    const bool isBetween = isFixed(one, at) && isFixed(one, last(at));
+    std::vector<uint32_t> freed;
+    for (size_t edge = 0; edge < 3; ++edge)
+        if (one.isAbrupt[edge] &&
+            (isTooShort(one, kShortestLine) || (isBetween && edge != next(at))))
+            for (const uint32_t same : ringOf(3 * triangle + uint32_t(edge))) freed.push_back(same);
+    if (freed.empty()) return false;
+    for (const uint32_t edge : freed) {
+        all[edge / 3].isAbrupt[edge % 3] = false;
+        made.push_back(edge / 3);  // it may be improved now
+    }
+    flipAll(std::move(freed));
+    return true;
+}
+
 void RefinedMesh::improve(size_t mostVertices) {
     noteShortestEdges(improvedFrom);
     std::vector<uint32_t> pending;
     auto take = [&] {
-        for (uint32_t t : made)
-            if (isPoor(all[t])) pending.push_back(t);
+        for (size_t k = 0; k < made.size(); ++k)  // lines that are given up make more triangles
+            if (!giveUpLine(made[k]) && isPoor(all[made[k]])) pending.push_back(made[k]);
         made.clear();
     };
     take();
