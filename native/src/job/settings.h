@@ -28,6 +28,7 @@ struct Settings : Skips {
     int contacts = 1;
     int adaptMeshes = 0;
     int maxVertices = 100000;
+    int discontinuityLines = 1;
     int countAdaptive = 0;
     int draft = 0;
     int minBundles = 64;

@@ -9,6 +9,8 @@
 #include "job/cancellation.h"
 #include "patches/side.h"
 #include "refinement/adapted_mesh.h"
+#include "refinement/discontinuity_lines.h"
+#include "refinement/source_light.h"
 
 namespace raybundle {
 namespace {
@@ -19,9 +21,17 @@ constexpr double kBulk = 0.3;
 constexpr double kForAngles = 0.1;
 // Objects whose stated error is below this share of the target keep their meshes.
 constexpr double kWorthMesh = 0.5;
+// Lines are searched in meshes whose errors are this many targets. With large triangles, more soft
+// edges are narrow; with small ones, more of the lines are found.
+constexpr double kForLines[] = {4, 2};
+// Lines in smaller triangles are more accurate, and are taken if they show this share of the jumps.
+constexpr double kAsMany = 0.9;
+// Share of the squared error that a mesh may have, up to which lines may replace soft edges.
+constexpr double kOfLines = 0.5;
 constexpr int kMostRounds = 100;
 
 using Meshes = std::vector<std::unique_ptr<AdaptedMesh>>;
+using Lines = std::vector<DiscontinuityLine>;
 
 // The exposed area of the shown sides of all baked objects, m^2, and the mean square of the light
 // on it, summed over RGB, (W/m^2)^2.
@@ -50,43 +60,6 @@ struct ShownArea {
     }
 };
 
-// Measures the errors of new triangles. Gathers the light of the sources where they want it.
-void measure(const KnownLight& known, const Meshes& meshes, const Progress& progress,
-             Report& report) {
-    std::vector<LightQuery> queries;
-    std::vector<uint32_t> meshOf;
-    std::vector<std::vector<uint32_t>> wanting;
-    for (uint32_t m = 0; m < meshes.size(); ++m) {
-        wanting.push_back(meshes[m]->measure());
-        for (uint32_t triangle : wanting.back()) meshes[m]->addPoints(triangle, queries);
-        meshOf.resize(queries.size(), m);
-    }
-    std::vector<uint32_t> gathering;
-    for (uint32_t q = 0; q < queries.size(); ++q)
-        if (queries[q].receiver) gathering.push_back(q);
-    std::vector<glm::vec3> ofSources(queries.size(), glm::vec3(0.0f));
-    std::vector<float> variance(queries.size(), 0.0f);
-    for (size_t k = 0; k < known.lights.size(); ++k) {
-        const Progress part = progress.part(k, known.lights.size());
-        const std::vector<Gathered> gathered = known.lights[k].direct.gather(
-            gathering.size(), [&](size_t r) { return *queries[gathering[r]].receiver; },
-            known.settings.targetError,
-            [&](double done) { part.report(RB_STAGE_RECONSTRUCTION, done); });
-        for (size_t r = 0; r < gathering.size(); ++r) {
-            const uint32_t q = gathering[r], side = queries[q].receiver->side;
-            ofSources[q] +=
-                known.shown.byAngle(side, gathered[r].meanAngles()) * gathered[r].irradiance;
-            variance[q] += gathered[r].variance;
-            report.shadowRays += gathered[r].rays;
-        }
-    }
-    for (size_t q = 0; q < queries.size(); ++q)
-        meshes[meshOf[q]]->setLight(queries[q], ofSources[q], variance[q]);
-    for (size_t m = 0; m < meshes.size(); ++m)
-        parallelFor(size_t(0), wanting[m].size(),
-                    [&](size_t k) { meshes[m]->measureAtPoints(wanting[m][k]); });
-}
-
 // Appends the triangles with the largest errors, which together have the share kBulk of `sum`, the
 // sum of all errors. Sorts the errors.
 void markLargest(const Meshes& meshes, std::vector<TriangleError>& errors, double sum,
@@ -101,51 +74,229 @@ void markLargest(const Meshes& meshes, std::vector<TriangleError>& errors, doubl
     }
 }
 
-// Returns the triangles to be refined next, by decreasing error. `area` is that of the scene, m^2.
-std::vector<TriangleError> markedTriangles(const Meshes& meshes, double area) {
-    std::vector<TriangleError> all, marks;
-    double sum = 0;
-    for (uint32_t m = 0; m < meshes.size(); ++m) {
-        std::vector<TriangleError> own;
-        const double ofMesh = meshes[m]->addErrors(m, own);
-        sum += ofMesh;
-        if (meshes[m]->isTooMuch(ofMesh)) markLargest(meshes, own, ofMesh, marks);
-        all.insert(all.end(), own.begin(), own.end());
-    }
-    if (sum > area) markLargest(meshes, all, sum, marks);
-    std::sort(marks.begin(), marks.end());
-    return marks;
-}
-
 size_t vertexCount(const Meshes& meshes) {
     return std::accumulate(meshes.begin(), meshes.end(), size_t(0),
                            [](size_t sum, const auto& m) { return sum + m->mesh().vertexCount(); });
 }
 
-// Refines triangles in this order. Returns whether there were vertices left for all.
-bool refine(const Meshes& meshes, const std::vector<TriangleError>& marks, size_t mostVertices) {
-    size_t count = vertexCount(meshes);
-    const auto forLight = size_t(double(mostVertices) * (1 - kForAngles));
-    bool isEnough = true;
-    for (const TriangleError& mark : marks) {
-        throwIfCancelledAt(count);
-        if (count >= forLight) {
-            isEnough = false;
-            break;
+// The meshes of a scene while they are adapted, all together.
+class Adaptation {
+  public:
+    // `these` are the instances, and `mostVertices` is the limit of all their vertices together.
+    // References must outlive the object.
+    Adaptation(const KnownLight& known, const std::vector<InstanceRange>& ranges,
+               const std::vector<size_t>& these, size_t mostVertices, const Progress& progress,
+               Report& report)
+        : known(known),
+          ranges(ranges),
+          these(these),
+          mostVertices(mostVertices),
+          progress(progress),
+          report(report),
+          shown(known, ranges) {
+        for (size_t i : these) meshes.push_back(adaptedMesh(i));
+    }
+
+    // Refines the meshes until their errors are as small as wanted. Starts again from lines across
+    // which the light jumps, where they save vertices. Returns whether there were vertices enough
+    // for that.
+    bool run() {
+        // With POINT, vertices on a line would gather the light of either side by chance.
+        if (!known.settings.discontinuityLines ||
+            known.settings.reconstruction == Reconstruction::POINT)
+            return toTarget(1);
+        bool isEnough = true;
+        std::vector<Lines> lines(meshes.size());
+        for (const double targets : kForLines) {
+            isEnough = isEnough && toTarget(targets);
+            for (size_t m = 0; m < meshes.size(); ++m)
+                if (Lines found = worthwhileLines(*meshes[m]);
+                    steps(found) > kAsMany * steps(lines[m]))
+                    lines[m] = std::move(found);
         }
-        RefinedMesh& mesh = meshes[mark.mesh]->mesh();
-        const size_t before = mesh.vertexCount();
-        mesh.refine(mark.triangle, before + (mostVertices > count ? mostVertices - count : 0));
-        count += mesh.vertexCount() - before;
+        isEnough = isEnough && toTarget(1);
+        Meshes without = startFrom(lines);
+        const bool isNowEnough = refineWhile([&] { return marksAbove(without); });
+        for (size_t m = 0; m < meshes.size(); ++m) {
+            if (!without[m]) continue;
+            const bool isFewer = without[m]->mesh().vertexCount() < meshes[m]->mesh().vertexCount();
+            if (isEnough && (!isNowEnough || isFewer)) meshes[m] = std::move(without[m]);
+        }
+        return isEnough || isNowEnough;
     }
-    for (const auto& adapted : meshes) {
-        RefinedMesh& mesh = adapted->mesh();
-        const size_t before = mesh.vertexCount();
-        mesh.improve(before + (mostVertices > count ? mostVertices - count : 0));
-        count += mesh.vertexCount() - before;
+
+    // Returns the mesh of an instance, given by its number among `these`.
+    FinerMesh result(size_t m) const { return meshes[m]->mesh().result(); }
+
+  private:
+    std::unique_ptr<AdaptedMesh> adaptedMesh(size_t instance, const Lines& lines = {},
+                                             size_t most = SIZE_MAX) const {
+        return std::make_unique<AdaptedMesh>(known, uint32_t(instance), ranges[instance],
+                                             shown.meanSquare, lines, most);
     }
-    return isEnough;
-}
+
+    // Refines the meshes until their errors are below some targets. Returns whether there were
+    // vertices enough for that.
+    bool toTarget(double targets) {
+        return refineWhile([&] { return marksAbove(targets * targets); });
+    }
+
+    // Measures the meshes and refines the triangles that `marked` returns, until it returns none.
+    // Returns whether there were vertices enough for that.
+    template <class Marked>
+    bool refineWhile(const Marked& marked) {
+        for (int round = 0; round < kMostRounds; ++round) {
+            measure();
+            const std::vector<TriangleError> marks = marked();
+            if (marks.empty()) break;
+            if (!refine(marks)) return false;
+        }
+        return true;
+    }
+
+    // Returns the lines of a mesh, without those that are so soft that they would be a large part
+    // of the error which the mesh may have.
+    Lines worthwhileLines(const AdaptedMesh& mesh) {
+        Lines lines = discontinuityLines(known, mesh, progress, report);
+        std::sort(lines.begin(), lines.end(), [](const auto& a, const auto& b) {
+            return a.jump * a.jump * a.width < b.jump * b.jump * b.width;
+        });
+        double left = kOfLines * mesh.allowedSum(shown.area);
+        size_t count = 0;
+        while (count < lines.size() && (left -= lines[count].square()) >= 0) ++count;
+        lines.resize(count);
+        return lines;
+    }
+
+    // Returns how much of the jumps of the light lines show, (W/m^2)^2 m.
+    static double steps(const Lines& lines) {
+        double sum = 0;
+        for (const DiscontinuityLine& line : lines) sum += line.jump * line.jump * line.length();
+        return sum;
+    }
+
+    // Replaces the meshes that have lines by those that start from them, and returns the replaced.
+    Meshes startFrom(const std::vector<Lines>& lines) {
+        Meshes replaced(meshes.size());
+        std::vector<LightQuery> queries;
+        std::vector<uint32_t> meshOf;
+        size_t count = vertexCount(meshes);
+        for (size_t m = 0; m < meshes.size(); ++m) {
+            if (lines[m].empty()) continue;
+            count -= meshes[m]->mesh().vertexCount();
+            replaced[m] = std::move(meshes[m]);
+            meshes[m] =
+                adaptedMesh(these[m], lines[m], mostVertices - std::min(mostVertices, count));
+            count += meshes[m]->mesh().vertexCount();
+            meshes[m]->addMixedTiles(queries);
+            meshOf.resize(queries.size(), uint32_t(m));
+        }
+        answer(queries, meshOf);
+        improveAngles();
+        return replaced;
+    }
+
+    // Measures the errors of new triangles. Gathers the light of the sources where they want it.
+    void measure() {
+        std::vector<LightQuery> queries;
+        std::vector<uint32_t> meshOf;
+        std::vector<std::vector<uint32_t>> wanting;
+        for (uint32_t m = 0; m < meshes.size(); ++m) {
+            wanting.push_back(meshes[m]->measure());
+            for (uint32_t triangle : wanting.back()) meshes[m]->addPoints(triangle, queries);
+            meshOf.resize(queries.size(), m);
+        }
+        answer(queries, meshOf);
+        for (size_t m = 0; m < meshes.size(); ++m)
+            parallelFor(size_t(0), wanting[m].size(),
+                        [&](size_t k) { meshes[m]->measureAtPoints(wanting[m][k]); });
+    }
+
+    // Gathers the light that is wanted. `meshOf` is the number of the mesh of each query.
+    void answer(const std::vector<LightQuery>& queries, const std::vector<uint32_t>& meshOf) {
+        std::vector<Receiver> receivers;
+        for (const LightQuery& query : queries)
+            if (query.receiver) receivers.push_back(*query.receiver);
+        const SourceLight light =
+            gatherSources(known, receivers, known.settings.targetError, progress, report);
+        for (size_t q = 0, r = 0; q < queries.size(); ++q) {
+            const bool isGathered = queries[q].receiver.has_value();
+            meshes[meshOf[q]]->setLight(queries[q], isGathered ? light.light[r] : glm::vec3(0.0f),
+                                        isGathered ? light.variance[r] : 0.0f);
+            r += isGathered;
+        }
+    }
+
+    // Returns the triangles to be refined next, by decreasing error, as long as squared errors are
+    // above `allowed` times those of the target.
+    std::vector<TriangleError> marksAbove(double allowed) const {
+        std::vector<TriangleError> all, marks;
+        double sum = 0;
+        for (uint32_t m = 0; m < meshes.size(); ++m) {
+            std::vector<TriangleError> own;
+            const double ofMesh = meshes[m]->addErrors(m, own);
+            sum += ofMesh;
+            if (meshes[m]->isTooMuch(ofMesh / allowed)) markLargest(meshes, own, ofMesh, marks);
+            all.insert(all.end(), own.begin(), own.end());
+        }
+        if (sum > allowed * shown.area) markLargest(meshes, all, sum, marks);
+        std::sort(marks.begin(), marks.end());
+        return marks;
+    }
+
+    // Returns the triangles to be refined next, by decreasing error, of the meshes whose error is
+    // above that of the mesh which they have replaced.
+    std::vector<TriangleError> marksAbove(const Meshes& replaced) const {
+        std::vector<TriangleError> marks;
+        for (uint32_t m = 0; m < meshes.size(); ++m) {
+            if (!replaced[m]) continue;
+            std::vector<TriangleError> before, own;
+            const double ofMesh = meshes[m]->addErrors(m, own);
+            if (ofMesh > replaced[m]->addErrors(m, before)) markLargest(meshes, own, ofMesh, marks);
+        }
+        std::sort(marks.begin(), marks.end());
+        return marks;
+    }
+
+    // Refines triangles in this order. Returns whether there were vertices left for all.
+    bool refine(const std::vector<TriangleError>& marks) {
+        size_t count = vertexCount(meshes);
+        const auto forLight = size_t(double(mostVertices) * (1 - kForAngles));
+        bool isEnough = true;
+        for (const TriangleError& mark : marks) {
+            throwIfCancelledAt(count);
+            if (count >= forLight) {
+                isEnough = false;
+                break;
+            }
+            RefinedMesh& mesh = meshes[mark.mesh]->mesh();
+            const size_t before = mesh.vertexCount();
+            mesh.refine(mark.triangle, before + (mostVertices > count ? mostVertices - count : 0));
+            count += mesh.vertexCount() - before;
+        }
+        improveAngles();
+        return isEnough;
+    }
+
+    void improveAngles() {
+        size_t count = vertexCount(meshes);
+        for (const auto& adapted : meshes) {
+            RefinedMesh& mesh = adapted->mesh();
+            const size_t before = mesh.vertexCount();
+            mesh.improve(before + (mostVertices > count ? mostVertices - count : 0));
+            count += mesh.vertexCount() - before;
+        }
+    }
+
+    const KnownLight& known;
+    const std::vector<InstanceRange>& ranges;
+    const std::vector<size_t>& these;
+    const size_t mostVertices;
+    const Progress& progress;
+    Report& report;
+    const ShownArea shown;
+    Meshes meshes;
+};
 
 }  // namespace
 
@@ -178,25 +329,14 @@ std::vector<FinerMesh> adaptMeshes(const KnownLight& known,
                         "raise max_vertices");
         return result;
     }
-    const ShownArea shown(known, ranges);
-    Meshes meshes;
-    for (size_t i : worthwhile)
-        meshes.push_back(
-            std::make_unique<AdaptedMesh>(known, uint32_t(i), ranges[i], shown.meanSquare));
-    const size_t most = mostOfAll - kept;
-    bool isEnough = true;
-    for (int round = 0; round < kMostRounds && isEnough; ++round) {
-        measure(known, meshes, progress, report);
-        const std::vector<TriangleError> marks = markedTriangles(meshes, shown.area);
-        if (marks.empty()) break;
-        isEnough = refine(meshes, marks, most);
-    }
+    Adaptation adaptation(known, ranges, worthwhile, mostOfAll - kept, progress, report);
+    const bool isEnough = adaptation.run();
     if (!isEnough)
         report.warn(WarningId::MAX_VERTICES,
                     "max_vertices (" + std::to_string(mostOfAll) +
                         ") was reached before the meshes could follow the light to the target; "
                         "raise max_vertices, or raise target_error");
-    for (size_t m = 0; m < meshes.size(); ++m) result[worthwhile[m]] = meshes[m]->mesh().result();
+    for (size_t m = 0; m < worthwhile.size(); ++m) result[worthwhile[m]] = adaptation.result(m);
     return result;
 }
 

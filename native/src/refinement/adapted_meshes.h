@@ -10,6 +10,8 @@
 //   (refinement/adapted_mesh.h). The light is known from a bake of the meshes as they are.
 // - The rounds end when the error of the scene is below the target, and that of each object below a
 //   few targets, relative to its own light.
+// - Where the light jumps along lines, a mesh that has these lines as edges is refined as well, until
+//   it has as little error. The mesh with fewer vertices is used.
 #pragma once
 
 #include <vector>

@@ -112,6 +112,23 @@ std::optional<uint32_t> FaceLight::tileAt(int32_t face, const glm::dvec3& point)
     return found;
 }
 
+bool FaceLight::isOn(int32_t face, const glm::dvec3& point) const {
+    const Patches& patches = known.tiles.patches();
+    const auto [begin, end] = tilesOf(face);
+    for (uint32_t tile = begin; tile < end;) {
+        const Parent& parent = patches.parents[parentOf[tile]];
+        if (parent.outside(parent.affineAt(point)) <= 0) return true;
+        tile += parent.patchCount();
+    }
+    return false;
+}
+
+std::optional<glm::dvec3> FaceLight::normal(int32_t face) const {
+    const auto [begin, end] = tilesOf(face);
+    if (begin == end) return {};
+    return glm::dvec3(known.tiles.patches().parents[parentOf[begin]].normal);
+}
+
 std::optional<Receiver> FaceLight::receiver(uint32_t tile, const glm::dvec3& point,
                                             uint32_t seed) const {
     const Patches& patches = known.patches;

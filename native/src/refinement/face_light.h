@@ -58,6 +58,7 @@ class FaceLight {
     std::array<uint32_t, 2> tilesOf(int32_t face) const {
         return {firstOfFace[size_t(face)], firstOfFace[size_t(face) + 1]};
     }
+    size_t tileCount() const { return tiles.size(); }
     size_t faceCount() const { return firstOfFace.size() - 1; }
     // Returns whether a tile shows light of both of its sides.
     bool isTranslucent(uint32_t tile) const {
@@ -67,6 +68,11 @@ class FaceLight {
     // Returns the tile of a face that contains a point (m, relative to Patches::centre). Empty if
     // the face has none.
     std::optional<uint32_t> tileAt(int32_t face, const glm::dvec3& point) const;
+
+    // Returns whether a point in the plane of a face is on it (m, relative to Patches::centre).
+    bool isOn(int32_t face, const glm::dvec3& point) const;
+    // Returns the normal of a face, a unit vector. Empty if the face has no tiles.
+    std::optional<glm::dvec3> normal(int32_t face) const;
 
     // Returns the receiver of the sources' light at a point on a tile; empty if another surface
     // touches the tile there, or if the light of the tile has to do.
