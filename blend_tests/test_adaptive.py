@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import raybundle
 from raybundle.live_light import LiveLight
-from surface_error import read_colors
+from surface_error import corner_vertices, read_colors
 
 PLANE = [(-5, -5, 0), (5, -5, 0), (5, 5, 0), (-5, 5, 0)]
 CUBE = [(-0.5, -0.5, 0), (0.5, -0.5, 0), (0.5, 0.5, 0), (-0.5, 0.5, 0),
@@ -63,7 +63,7 @@ def border_length(item):
 def test_vertices_follow_the_shadow(cube_on_plane):
     kept = raybundle.bake(bpy.context, topology='KEEP')
     bpy.ops.raybundle.clear()
-    report = bake()
+    report = bake(discontinuity_lines=False)
     copy = copy_of(cube_on_plane)
     assert copy.visible_get() and not cube_on_plane.visible_get()
     assert len(cube_on_plane.data.vertices) == 6 and not cube_on_plane.data.color_attributes
@@ -77,6 +77,32 @@ def test_vertices_follow_the_shadow(cube_on_plane):
     assert np.median(np.linalg.norm(points[:, :2], axis=1)) < 2.5
     light = read_colors(copy).mean(axis=1)
     assert light.min() < 0.2 * light.max()
+
+
+def jumps(mesh: bpy.types.Mesh, light: np.ndarray) -> np.ndarray:
+    """Returns the difference between the brightest and the darkest corner of each vertex."""
+    vertices = corner_vertices(mesh)
+    most = np.full(len(mesh.vertices), -np.inf)
+    least = np.full(len(mesh.vertices), np.inf)
+    np.maximum.at(most, vertices, light)
+    np.minimum.at(least, vertices, light)
+    return most - least
+
+
+def test_a_shadow_is_crisp_with_few_vertices(cube_on_plane):
+    without = bake(discontinuity_lines=False)
+    blurred = read_colors(copy_of(cube_on_plane)).mean(axis=1)
+    assert jumps(copy_of(cube_on_plane).data, blurred).max() < 1e-5
+    report = bake()
+    copy = copy_of(cube_on_plane)
+    assert report.vertices['after'] < 0.6 * without.vertices['after']
+    assert report.error['mesh'] < 1.2 * without.error['mesh']
+    light = read_colors(copy).mean(axis=1)
+    # The corners of the shadow, which is a hexagon with one side under the cube.
+    assert np.count_nonzero(jumps(copy.data, light) > 0.3 * light.max()) >= 5
+    # A vertex with one value cannot show the two sides of an edge.
+    report = bake(domain='POINT')
+    assert report.vertices == without.vertices
 
 
 def test_vertices_are_counted_before_one_decides(cube_on_plane):
@@ -110,7 +136,7 @@ def test_a_furnace_keeps_its_mesh(closed_box):
 
 
 def test_the_limit_of_vertices_is_kept_and_named(cube_on_plane):
-    report = bake(max_vertices=90, target_error=0.005)
+    report = bake(max_vertices=90, target_error=0.005, discontinuity_lines=False)
     assert sum(len(copy_of(item).data.vertices)
                for item in (cube_on_plane, bpy.data.objects["Cube"])) <= 90
     assert any("max_vertices (90) was reached" in warning for warning in report.warnings)

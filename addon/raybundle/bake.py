@@ -331,6 +331,9 @@ def _apply_settings(native_bake: native.Bake, settings: BakeSettings) -> None:
             native_bake.set(name, skip not in settings.skips_off)
         elif name == 'adapt_meshes':
             native_bake.set(name, settings.topology == 'ADAPTIVE')
+        elif name == 'discontinuity_lines':
+            # A vertex has one value in the domain POINT: that of both sides of the line.
+            native_bake.set(name, settings.discontinuity_lines and settings.domain == 'CORNER')
         elif hasattr(settings, name):
             native_bake.set(name, getattr(settings, name))
 

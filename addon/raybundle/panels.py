@@ -166,6 +166,9 @@ class RAYBUNDLE_PT_quality(RaybundleRenderPanel, bpy.types.Panel):
         row = layout.row()
         row.active = settings.topology == 'ADAPTIVE'
         row.prop(settings, "max_vertices")
+        row = layout.row()
+        row.active = settings.topology == 'ADAPTIVE' and settings.domain == 'CORNER'
+        row.prop(settings, "discontinuity_lines")
         layout.prop(settings, "simplify")
         row = layout.row()
         row.active = settings.topology != 'ADAPTIVE'

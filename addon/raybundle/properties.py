@@ -314,6 +314,12 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
         description="Maximum number of vertices of all adapted meshes together; meshes that have "
                     "more keep theirs",
         default=100_000, min=1, max=2 ** 26, soft_max=10_000_000)
+    discontinuity_lines: BoolProperty(
+        name="Discontinuity Lines",
+        description="Let edges of adapted meshes follow the edges of hard shadows, where this "
+                    "saves vertices. The light differs on the two sides of such an edge, which the "
+                    "domain Vertex cannot show",
+        default=True)
     simplify: BoolProperty(
         name="Simplify",
         description="Write the light to copies without the vertices that neither it nor the shape "
@@ -490,6 +496,7 @@ class BakeSettings:
     write_error: bool
     topology: str
     max_vertices: int
+    discontinuity_lines: bool
     simplify: bool
     count_adaptive: bool
     shared_meshes: str
