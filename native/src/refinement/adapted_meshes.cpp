@@ -28,6 +28,9 @@ constexpr double kForLines[] = {4, 2};
 constexpr double kAsMany = 0.9;
 // Share of the squared error that a mesh may have, up to which lines may replace soft edges.
 constexpr double kOfLines = 0.5;
+// Lines are used if they take at most this many times the vertices: at equal error, the crisp edge
+// of a shadow looks better than the jagged one of small triangles.
+constexpr double kForCrisp = 1.1;
 constexpr int kMostRounds = 100;
 
 using Meshes = std::vector<std::unique_ptr<AdaptedMesh>>;
@@ -119,8 +122,9 @@ class Adaptation {
         const bool isNowEnough = refineWhile([&] { return marksAbove(without); });
         for (size_t m = 0; m < meshes.size(); ++m) {
             if (!without[m]) continue;
-            const bool isFewer = without[m]->mesh().vertexCount() < meshes[m]->mesh().vertexCount();
-            if (isEnough && (!isNowEnough || isFewer)) meshes[m] = std::move(without[m]);
+            const bool isWorse = double(meshes[m]->mesh().vertexCount()) >
+                                 kForCrisp * double(without[m]->mesh().vertexCount());
+            if (isEnough && (!isNowEnough || isWorse)) meshes[m] = std::move(without[m]);
         }
         return isEnough || isNowEnough;
     }

@@ -10,6 +10,7 @@
 #include "refinement/jump_search.h"
 #include "refinement/line_points.h"
 #include "refinement/source_light.h"
+#include "scene/disjoint_sets.h"
 
 namespace raybundle {
 namespace {
@@ -109,6 +110,7 @@ class LineSearch {
         auto follow = [&](const Crossing& start) {
             PointLine line{start.first};
             line.isOpen[0] = !jumps.edge(start.second).isOfSource;
+            line.edge[0] = start.second;
             for (uint32_t at = start.second;;) {
                 const JumpEdge& edge = jumps.edge(at);
                 const double widest = std::max(edge.coveredWidth(), edge.width);
@@ -116,6 +118,7 @@ class LineSearch {
                                        std::max(kAccuracy, kOfWidth * widest) * edge.length(),
                                        edge.width * (edge.to - edge.from)});
                 line.isOpen[1] = !edge.isOfSource;
+                line.edge[1] = at;
                 line.jump = std::max(line.jump, edge.difference());
                 std::vector<uint32_t>& onward = next[{start.first, at}];
                 if (onward.empty()) break;
@@ -149,13 +152,21 @@ class LineSearch {
         return widest;
     }
 
-    static std::vector<PointLine> longLines(std::vector<PointLine> lines) {
-        lines.erase(std::remove_if(lines.begin(), lines.end(),
-                                   [](const PointLine& line) {
-                                       return line.length() < kShortest * line.meanEdge();
-                                   }),
-                    lines.end());
-        return lines;
+    // Returns the lines that are long, together with those in which they go on in other faces.
+    static std::vector<PointLine> longLines(const std::vector<PointLine>& lines) {
+        DisjointSets joined(lines.size());
+        std::map<uint32_t, uint32_t> atEdge;  // the first line that ends on an edge of the source
+        for (uint32_t k = 0; k < lines.size(); ++k)
+            for (const bool isLast : {false, true})
+                if (!lines[k].isOpen[isLast])
+                    joined.join(k, atEdge.try_emplace(lines[k].edge[isLast], k).first->second);
+        std::vector<double> lengths(lines.size(), 0.0);  // in lengths of the edges that are crossed
+        for (uint32_t k = 0; k < lines.size(); ++k)
+            lengths[joined.root(k)] += lines[k].length() / lines[k].meanEdge();
+        std::vector<PointLine> result;
+        for (uint32_t k = 0; k < lines.size(); ++k)
+            if (lengths[joined.root(k)] >= kShortest) result.push_back(lines[k]);
+        return result;
     }
 
     // Prolongs open ends of lines straight on, as far as the light jumps: up to the surface that

@@ -263,6 +263,7 @@ std::vector<PointLine> joinEnds(const std::vector<PointLine>& lines) {
     auto follow = [&](size_t start) {
         PointLine all{lines[start / 2].face};
         all.isOpen[0] = lines[start / 2].isOpen[start % 2] && partner[start] == kNoEnd;
+        all.edge[0] = lines[start / 2].edge[start % 2];
         for (size_t at = start; at != kNoEnd && !isTaken[at / 2];) {
             const PointLine& line = lines[at / 2];
             isTaken[at / 2] = 1;
@@ -273,6 +274,7 @@ std::vector<PointLine> joinEnds(const std::vector<PointLine>& lines) {
             all.jump = std::max(all.jump, line.jump);
             const size_t last = at ^ 1;
             all.isOpen[1] = line.isOpen[last % 2] && partner[last] == kNoEnd;
+            all.edge[1] = line.edge[last % 2];
             at = partner[last];
         }
         if (partner[start] != kNoEnd) all.points.push_back(all.points.front());  // a ring

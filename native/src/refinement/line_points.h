@@ -23,8 +23,9 @@ struct LinePoint {
 struct PointLine {
     int32_t face;  // of the source
     std::vector<LinePoint> points{};
-    std::array<bool, 2> isOpen{};  // per end: whether the line ends within the face
-    double jump = 0;               // largest difference of the light across the line, W/m^2
+    std::array<bool, 2> isOpen{};    // per end: whether the line ends within the face
+    std::array<uint32_t, 2> edge{};  // per end: the index of the edge that the line crosses there
+    double jump = 0;                 // largest difference of the light across the line, W/m^2
 
     const LinePoint& end(bool isLast) const { return isLast ? points.back() : points.front(); }
     // Returns the direction in which the line arrives at an end; no unit vector.
