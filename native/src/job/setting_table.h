@@ -86,8 +86,8 @@ inline constexpr Setting kSettings[] = {
      "Maximum number of vertices of all adapted meshes together; meshes that have more keep theirs",
      &Settings::maxVertices, 1, double(1 << 26)},
     {"discontinuity_lines",
-     "Let edges of adapted meshes follow the edges of hard shadows, where this saves vertices; the "
-     "light jumps there between the corners of a vertex",
+     "Let edges of adapted meshes follow the edges of hard shadows, where this takes few vertices; "
+     "the light jumps there between the corners of a vertex",
      &Settings::discontinuityLines},
     {"count_adaptive",
      "Count the vertices that the topology Adaptive would need, without changing any mesh; takes "

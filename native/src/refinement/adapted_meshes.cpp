@@ -101,8 +101,8 @@ class Adaptation {
     }
 
     // Refines the meshes until their errors are as small as wanted. Starts again from lines across
-    // which the light jumps, where they save vertices. Returns whether there were vertices enough
-    // for that.
+    // which the light jumps, unless these take more vertices. Returns whether there were
+    // vertices enough for that.
     bool run() {
         // With POINT, vertices on a line would gather the light of either side by chance.
         if (!known.settings.discontinuityLines ||

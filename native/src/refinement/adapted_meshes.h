@@ -11,7 +11,7 @@
 // - The rounds end when the error of the scene is below the target, and that of each object below a
 //   few targets, relative to its own light.
 // - Where the light jumps along lines, a mesh that has these lines as edges is refined as well, until
-//   it has as little error. The mesh with fewer vertices is used.
+//   it has as little error. It is used unless it has more than a tenth more vertices.
 #pragma once
 
 #include <vector>
