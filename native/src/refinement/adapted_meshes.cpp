@@ -119,13 +119,13 @@ class Adaptation {
         }
         isEnough = isEnough && toTarget(1);
         Meshes without = startFrom(lines);
-        const bool isNowEnough = refineWhile([&] { return marksAbove(without); });
-        for (size_t m = 0; m < meshes.size(); ++m) {
-            if (!without[m]) continue;
-            const bool isWorse = double(meshes[m]->mesh().vertexCount()) >
-                                 kForCrisp * double(without[m]->mesh().vertexCount());
-            if (isEnough && (!isNowEnough || isWorse)) meshes[m] = std::move(without[m]);
+        std::vector<double> errors;  // per mesh: its error without lines
+        for (const auto& mesh : without) {
+            std::vector<TriangleError> ofTriangles;
+            errors.push_back(mesh ? mesh->addErrors(0, ofTriangles) : INFINITY);
         }
+        const bool isNowEnough = refineWhile([&] { return marksAbove(errors); });
+        if (isEnough) goBack(without, isNowEnough);
         return isEnough || isNowEnough;
     }
 
@@ -146,16 +146,18 @@ class Adaptation {
     }
 
     // Measures the meshes and refines the triangles that `marked` returns, until it returns none.
-    // Returns whether there were vertices enough for that.
+    // Returns whether there were vertices enough for that. All triangles are measured then.
     template <class Marked>
     bool refineWhile(const Marked& marked) {
-        for (int round = 0; round < kMostRounds; ++round) {
+        bool isEnough = true;
+        for (int round = 0; round < kMostRounds && isEnough; ++round) {
             measure();
             const std::vector<TriangleError> marks = marked();
-            if (marks.empty()) break;
-            if (!refine(marks)) return false;
+            if (marks.empty()) return true;
+            isEnough = refine(marks);
         }
-        return true;
+        measure();
+        return isEnough;
     }
 
     // Returns the lines of a mesh, without those that are so soft that they would be a large part
@@ -248,18 +250,34 @@ class Adaptation {
         return marks;
     }
 
-    // Returns the triangles to be refined next, by decreasing error, of the meshes whose error is
-    // above that of the mesh which they have replaced.
-    std::vector<TriangleError> marksAbove(const Meshes& replaced) const {
+    // Returns the triangles to be refined next, by decreasing error, of the meshes whose squared
+    // error is above `allowed`, which is per mesh.
+    std::vector<TriangleError> marksAbove(const std::vector<double>& allowed) const {
         std::vector<TriangleError> marks;
         for (uint32_t m = 0; m < meshes.size(); ++m) {
-            if (!replaced[m]) continue;
-            std::vector<TriangleError> before, own;
+            if (allowed[m] == INFINITY) continue;
+            std::vector<TriangleError> own;
             const double ofMesh = meshes[m]->addErrors(m, own);
-            if (ofMesh > replaced[m]->addErrors(m, before)) markLargest(meshes, own, ofMesh, marks);
+            if (ofMesh > allowed[m]) markLargest(meshes, own, ofMesh, marks);
         }
         std::sort(marks.begin(), marks.end());
         return marks;
+    }
+
+    // Puts back the meshes `without` lines whose lines take too many vertices. Puts back all if
+    // there were not enough vertices, or too many in the end.
+    void goBack(Meshes& without, bool isEnough) {
+        auto count = [](const auto& mesh) { return mesh->mesh().vertexCount(); };
+        std::vector<uint8_t> isWorse(meshes.size(), 0);
+        size_t sum = 0;
+        for (size_t m = 0; m < meshes.size(); ++m) {
+            isWorse[m] =
+                without[m] && double(count(meshes[m])) > kForCrisp * double(count(without[m]));
+            sum += count(isWorse[m] ? without[m] : meshes[m]);
+        }
+        for (size_t m = 0; m < meshes.size(); ++m)
+            if (without[m] && (isWorse[m] || !isEnough || sum > mostVertices))
+                meshes[m] = std::move(without[m]);
     }
 
     // Refines triangles in this order. Returns whether there were vertices left for all.
