@@ -317,8 +317,8 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
     discontinuity_lines: BoolProperty(
         name="Discontinuity Lines",
         description="Let edges of adapted meshes follow the edges of hard shadows, where this "
-                    "takes few vertices. The light differs on the two sides of such an edge, which "
-                    "the domain Vertex cannot show",
+                    "takes few vertices; the light then differs between the corners of a vertex, "
+                    "which one value per vertex cannot show",
         default=True)
     simplify: BoolProperty(
         name="Simplify",

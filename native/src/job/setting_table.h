@@ -87,7 +87,8 @@ inline constexpr Setting kSettings[] = {
      &Settings::maxVertices, 1, double(1 << 26)},
     {"discontinuity_lines",
      "Let edges of adapted meshes follow the edges of hard shadows, where this takes few vertices; "
-     "the light jumps there between the corners of a vertex",
+     "the light then differs between the corners of a vertex, which one value per vertex cannot "
+     "show",
      &Settings::discontinuityLines},
     {"count_adaptive",
      "Count the vertices that the topology Adaptive would need, without changing any mesh; takes "
