@@ -57,23 +57,6 @@ void RefinedMesh::addLines(const std::vector<Line>& lines, size_t mostVertices) 
     }
 }
 
-glm::dvec3 RefinedMesh::sharesAt(const Triangle& triangle, const glm::dvec3& point) const {
-    const glm::dvec3 &a = position(triangle, 0), &b = position(triangle, 1),
-                     &c = position(triangle, 2);
-    const glm::dvec3 normal = areaVector(triangle);
-    const double scale = glm::dot(normal, normal);
-    if (!(scale > 0)) return glm::dvec3(-INFINITY);
-    return glm::dvec3(glm::dot(normal, glm::cross(c - b, point - b)),
-                      glm::dot(normal, glm::cross(a - c, point - c)),
-                      glm::dot(normal, glm::cross(b - a, point - a))) /
-           scale;
-}
-
-double RefinedMesh::smallestShare(const Triangle& triangle, const glm::dvec3& point) const {
-    const glm::dvec3 shares = sharesAt(triangle, point);
-    return std::min({shares.x, shares.y, shares.z});
-}
-
 std::optional<uint32_t> RefinedMesh::placeAt(const Line& line, const glm::dvec3& point,
                                              FaceTriangles& triangles, size_t mostVertices) {
     const std::vector<uint32_t>& ofFace = triangles.of(line.face);

@@ -7,6 +7,7 @@
 #include <tuple>
 
 #include "job/cancellation.h"
+#include "scene/rounded.h"
 #include "scene/triangulation.h"
 
 namespace raybundle {
@@ -17,6 +18,11 @@ namespace {
 constexpr double kThin = 10;
 // Edges shorter than this share of the largest distance from an origin are not bisected.
 constexpr double kLeastOfFarthest = 1e-6;
+// Binary digits of squared lengths that are compared. Positions are floats.
+constexpr int kLengthDigits = 18;
+// Barycentric coordinates that differ by less are mere rounding errors. Of two triangles, the first
+// then has a point that lies on the edge between them.
+constexpr double kEqualShare = 1e-6;
 
 }  // namespace
 
@@ -193,6 +199,23 @@ double RefinedMesh::area(const Triangle& triangle) const {
     return 0.5 * glm::length(areaVector(triangle));
 }
 
+glm::dvec3 RefinedMesh::sharesAt(const Triangle& triangle, const glm::dvec3& point) const {
+    const glm::dvec3 &a = position(triangle, 0), &b = position(triangle, 1),
+                     &c = position(triangle, 2);
+    const glm::dvec3 normal = areaVector(triangle);
+    const double scale = glm::dot(normal, normal);
+    if (!(scale > 0)) return glm::dvec3(-INFINITY);
+    return glm::dvec3(glm::dot(normal, glm::cross(c - b, point - b)),
+                      glm::dot(normal, glm::cross(a - c, point - c)),
+                      glm::dot(normal, glm::cross(b - a, point - a))) /
+           scale;
+}
+
+double RefinedMesh::smallestShare(const Triangle& triangle, const glm::dvec3& point) const {
+    const glm::dvec3 shares = sharesAt(triangle, point);
+    return std::round(std::min({shares.x, shares.y, shares.z}) / kEqualShare) * kEqualShare;
+}
+
 double RefinedMesh::edgeLength2(const Triangle& triangle, size_t edge) const {
     // From the smaller place, so that both triangles of an edge find the same length.
     const uint32_t a = triangle.place[edge], b = triangle.place[next(edge)];
@@ -207,7 +230,8 @@ double RefinedMesh::longestEdge(const Triangle& triangle) const {
 size_t RefinedMesh::longest(const Triangle& triangle) const {
     auto key = [&](size_t edge) {
         const uint32_t p = triangle.place[edge], q = triangle.place[next(edge)];
-        return std::make_tuple(edgeLength2(triangle, edge), std::min(p, q), std::max(p, q));
+        return std::make_tuple(rounded(edgeLength2(triangle, edge), kLengthDigits), std::min(p, q),
+                               std::max(p, q));
     };
     size_t best = 0;
     for (size_t k = 1; k < 3; ++k)

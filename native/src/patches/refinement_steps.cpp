@@ -28,6 +28,14 @@ constexpr size_t kMostSteps = 30;
 constexpr double kShortest = 0.3;
 // The same for triangles at lines, which are then given up.
 constexpr double kShortestLine = 0.7;
+// Sine of the angle to a line below which a point is on it. Points are rounded to floats.
+constexpr double kOnLine = 1e-5;
+
+// Returns whether a point lies on the side of a line from which `side` points away, by its position
+// relative to a point of the line. A point on the line, where rounding would decide, does not.
+bool isBefore(const glm::dvec3& side, const glm::dvec3& point) {
+    return glm::dot(side, point) < -kOnLine * glm::length(side) * glm::length(point);
+}
 
 }  // namespace
 
@@ -112,7 +120,7 @@ void RefinedMesh::bisect(const std::vector<uint32_t>& ring, double share) {
         const glm::dvec3 side = glm::cross(across, areaVector(old));
         for (uint32_t p : old.points) {
             // cross(across, normal) points away from the first half.
-            const bool isFirst = glm::dot(side, points[p] - places[middle]) < 0;
+            const bool isFirst = isBefore(side, points[p] - places[middle]);
             all[isFirst ? first : second].points.push_back(p);
         }
         all[one / 3].points = {};
@@ -187,7 +195,7 @@ bool RefinedMesh::flipIfBetter(uint32_t edge, std::vector<uint32_t>& stack) {
     const glm::dvec3 side = glm::cross(c - d, normal);  // points away from a
     for (const uint32_t triangle : {edge / 3, other / 3}) {
         for (uint32_t p : all[triangle].points) {
-            const bool isAtA = glm::dot(side, points[p] - d) < 0;
+            const bool isAtA = isBefore(side, points[p] - d);
             all[isAtA ? atA : atB].points.push_back(p);
         }
         all[triangle].isAlive = false;

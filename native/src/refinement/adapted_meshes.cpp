@@ -100,9 +100,9 @@ class Adaptation {
         for (size_t i : these) meshes.push_back(adaptedMesh(i));
     }
 
-    // Refines the meshes until their errors are as small as wanted. Starts again from lines across
-    // which the light jumps, unless these take more vertices. Returns whether there were
-    // vertices enough for that.
+    // Refines the meshes until their errors are as small as wanted. Does so again from lines on,
+    // across which the light jumps, and keeps the result where that takes few vertices. Returns
+    // whether there were vertices enough.
     bool run() {
         // With POINT, vertices on a line would gather the light of either side by chance.
         if (!known.settings.discontinuityLines ||

@@ -50,8 +50,8 @@ class CollapsingMesh {
     std::vector<int32_t> triangleOf;     // per face of `mesh`
     std::vector<uint8_t> isLocked;       // per vertex of `mesh`: whether it stays
     std::vector<int32_t> featureCounts;  // per vertex of `mesh`: features that end there
-    // By edgeKey() of vertices of `mesh` with a feature between them: the corner of the source at which an
-    // edge of the source begins that lies on it.
+    // By edgeKey() of vertices of `mesh` with a feature between them: the corner of the source at
+    // which an edge of the source begins that lies on it.
     std::unordered_map<uint64_t, int32_t> features;
     float extent = 0;  // the largest of the mesh along an axis, m
 
