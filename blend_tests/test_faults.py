@@ -281,6 +281,30 @@ def test_a_bake_within_a_bake_is_refused(closed_box):
 
 
 # --------------------------------------------------------------------------------------------------
+# Large meshes
+# --------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("topology", ['KEEP', 'ADAPTIVE'])
+def test_a_bake_that_needs_too_much_memory_loses_nothing(closed_box, new_object, topology):
+    bake()
+    # Half a million faces take a gigabyte.
+    x, y = np.meshgrid(np.linspace(-1.0, 1.0, 700), np.linspace(-1.0, 1.0, 700))
+    corner = np.arange(700 * 700).reshape(700, 700)
+    faces = np.stack([corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]], axis=-1)
+    grid = new_object("Grid", np.stack([x, y, 0.1 * np.sin(9.0 * x)], axis=-1).reshape(-1, 3),
+                      faces.reshape(-1, 4))
+    with pytest.raises(raybundle.RaybundleError, match=r"memory_limit allows \(300 MB\)"):
+        bake(memory_limit=300.0, max_patches=1_000_000, topology=topology)
+    assert len(grid.data.color_attributes) == 0
+    assert len([item for item in bpy.data.objects if item.raybundle.source]) == 0
+    assert is_furnace(read_colors(closed_box))
+    bpy.data.objects.remove(grid)
+    bake()
+    assert is_furnace(read_colors(closed_box))
+
+
+# --------------------------------------------------------------------------------------------------
 # Files
 # --------------------------------------------------------------------------------------------------
 

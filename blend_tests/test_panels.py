@@ -149,7 +149,7 @@ def test_the_panel_names_the_preferences_that_apply(user):
 
 def test_preferences_change_nothing_by_default(user):
     values = properties.read_settings(bpy.context.scene, {})
-    assert (values.threads, values.memory_limit) == (0, 4096.0)
+    assert (values.threads, values.memory_limit) == (0, 0.0)
 
 
 def test_the_bug_report_names_versions_and_settings(closed_box):

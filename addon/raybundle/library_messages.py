@@ -66,9 +66,9 @@ WARNINGS = (
                     "the noise is {noise}, and at least {most} on the noisiest parts",
                     "the noise of light set {set} is {noise}, and at least {most} on the noisiest "
                     "parts")),
-    "memory_limit was reached at {count} bundles. The other {others} bundles were used once and "
-    "discarded. The result is therefore less precise, and relighting has to trace these bundles "
-    "again; increase memory_limit",
+    "the half of memory_limit that lines may take was full at {count} bundles. The other {others} "
+    "bundles were used once and discarded. The result is therefore less precise, and relighting "
+    "has to trace these bundles again; increase memory_limit",
     "{count} times, patches covered each other in a cycle, which no drawing order can solve. Some "
     "lines therefore meet surfaces in the wrong order; choose projector AUTO, which needs no "
     "drawing order",
@@ -114,6 +114,11 @@ _TOO_BRIGHT = " is too bright; reduce it to at most 1e15 (W/m^2, W/sr or W/(m^2 
 # Errors. {what} is a name in the interface of the library.
 ERRORS = (
     "the bake was cancelled", "out of memory",
+    "the bake needs more than three quarters of this computer's memory ({size} MB); set "
+    "memory_limit to allow more, reduce max_patches, or bake fewer objects or simpler meshes at "
+    "once",
+    "the bake needs more memory than memory_limit allows ({size} MB); raise memory_limit, reduce "
+    "max_patches, or bake fewer objects or simpler meshes at once",
     "this processor does not support SSE 4.2 and POPCNT, which Raybundle requires",
     "the ray tracer Embree could not {what}: out of memory",
     "the ray tracer Embree could not {what}: it does not support this processor",

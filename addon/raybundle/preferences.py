@@ -55,10 +55,9 @@ class RaybundlePreferences(bpy.types.AddonPreferences):
         default=0, min=0, soft_max=64, max=1024)
     memory_limit: FloatProperty(
         name="Memory Limit (MB)",
-        description="Maximum memory for the exchanges between patches, in MB, for scenes that do "
-                    "not set their own limit",
-        default=4096.0, min=1.0, max=1e9, soft_min=64.0, soft_max=262_144.0, precision=0,
-        step=6400)
+        description="Maximum memory of a bake, in MB, for scenes that do not set their own limit; "
+                    "0 allows three quarters of the computer's memory",
+        default=0.0, min=0.0, max=1e9, soft_max=262_144.0, precision=0, step=6400)
     live_bakes: BoolProperty(
         name="Bake when Changes Stop",
         description="In live mode, replace the draft by a bake with the settings of the scene as "

@@ -403,9 +403,10 @@ class RaybundleSceneSettings(bpy.types.PropertyGroup):
                     "patch",
         default=0, min=0, max=2 ** 26, soft_max=10_000_000)
     memory_limit: FloatProperty(
-        name="Memory Limit", description="Maximum memory for the exchanges between patches, in MB",
-        default=4096.0, min=1.0, max=1e9, soft_min=64.0, soft_max=262_144.0, precision=0,
-        step=6400)
+        name="Memory Limit",
+        description="Maximum memory of a bake, in MB, half of it for the exchanges between "
+                    "patches; 0 allows three quarters of the computer's memory",
+        default=0.0, min=0.0, max=1e9, soft_max=262_144.0, precision=0, step=6400)
     seed: IntProperty(
         name="Seed", description="Seed of the random numbers; the same seed gives the same noise",
         default=0, min=0)

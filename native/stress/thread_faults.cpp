@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 //
 // Checks that a bake for which the system starts fewer threads than asked for gives the right light
-// with the threads that it gets, and warns. It asks for four threads, the calling one included, and
-// gets 1 to 4.
+// with the threads that it gets, and warns. It asks for four threads, beside the calling one, which
+// watches them, and gets 0 to 4. If it gets none, the calling one computes.
 //
 // The program replaces pthread_create. Each number of threads has a process of its own, since
 // oneTBB keeps the threads that it has started.
@@ -57,15 +57,16 @@ namespace {
 
 using namespace raybundle::test;
 
-// Bakes with at most `threads` threads. The first bake writes its light to `light`; the light of
-// others must be equal to it. Returns 0 if all is right, else the number of the check that failed.
+// Bakes while at most `threads` threads can be started. The first bake writes its light to `light`;
+// the light of others must be equal to it. Returns 0 if all is right, else the number of the check
+// that failed.
 int bakeWith(int threads, float* light, bool isFirst) {
     // Largest number of threads of oneTBB, independent of the number of cores.
     const tbb::global_control cores(tbb::global_control::max_allowed_parallelism, kAsked);
     const rb_scene room = roomOf(10);
     const rb_bake bake = newBake("LEAST_SQUARES");
     rb_set_bake_int(bake, "threads", isFirst ? 1 : kAsked);
-    most = threads - 1;
+    most = threads;
     for (int k = 0; k < 3; ++k) {
         if (rb_execute_bake(bake, room) != RB_ERROR_NONE) return 1;
         const std::vector<float> found = lightOf(bake);
@@ -88,16 +89,18 @@ int main() {
     if (shared == MAP_FAILED) return 1;
     // The first bake asks for one thread only, and gives the light that the others are compared
     // with.
-    for (int threads : {0, 1, 2, 3, kAsked}) {
+    constexpr int kFirst = -1;
+    for (int threads : {kFirst, 0, 1, 2, 3, kAsked}) {
+        const bool isFirst = threads == kFirst;
         const pid_t child = fork();
         if (child == 0)
-            _exit(bakeWith(threads ? threads : 1, static_cast<float*>(shared), threads == 0));
+            _exit(bakeWith(isFirst ? 1 : threads, static_cast<float*>(shared), isFirst));
         int status = -1;
         if (child < 0 || waitpid(child, &status, 0) != child || status != 0) {
             std::printf("%d threads of %d: failed, status %x\n", threads, kAsked, unsigned(status));
             return 1;
         }
-        if (threads) std::printf("%d threads of %d: the light of one\n", threads, kAsked);
+        if (!isFirst) std::printf("%d threads of %d: the light of one\n", threads, kAsked);
     }
     return 0;
 }

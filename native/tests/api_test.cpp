@@ -38,7 +38,7 @@ TEST_F(Api, SettingsHaveReadableDefaults) {
         EXPECT_EQ(number, value) << name;
     }
     const std::vector<std::pair<const char*, float>> reals = {{"target_error", 0.02f},
-                                                              {"memory_limit", 4096},
+                                                              {"memory_limit", 0},
                                                               {"regularization", 0.005f},
                                                               {"patch_size", 0.2f}};
     for (const auto& [name, value] : reals) {

@@ -60,7 +60,7 @@ Scene court(const Lit& lit = {}, bool isSplit = false) {
 
 std::unique_ptr<Bake> baked(const Scene& scene,
                             Reconstruction reconstruction = Reconstruction::LEAST_SQUARES,
-                            float megabytes = 4096, int bundleCount = 128) {
+                            float megabytes = 8192, int bundleCount = 128) {
     auto bake = std::make_unique<Bake>();
     setQuick(*bake, bundleCount);
     bake->settings.reconstruction = reconstruction;
@@ -171,8 +171,8 @@ TEST(LightSets, KeepTheirLinesWhenALampChanges) {
 
 // All these bakes use the same bundles once and then discard them.
 TEST(LightSets, ShareTheLinesBeyondTheMemoryLimit) {
-    const auto together = baked(court({}, true), Reconstruction::LEAST_SQUARES, 1, 512);
-    const auto second = baked(court({false, true, false}), Reconstruction::LEAST_SQUARES, 1, 512);
+    const auto together = baked(court({}, true), Reconstruction::LEAST_SQUARES, 2, 512);
+    const auto second = baked(court({false, true, false}), Reconstruction::LEAST_SQUARES, 2, 512);
     const Json warnings = reportOf(*together)["warnings"];
     ASSERT_TRUE(mentions(warnings, "memory_limit")) << warnings;
     EXPECT_EQ(std::count_if(warnings.begin(), warnings.end(),

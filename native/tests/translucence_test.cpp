@@ -157,7 +157,7 @@ TEST(TranslucenceOfMaterials, TooMuchIsClamped) {
 TEST(TranslucenceOfMaterials, ACubeStaysExactBeyondTheMemoryLimit) {
     Bake bake;
     bake.settings.patchSize = 0.1f;
-    bake.settings.memoryLimit = 1;
+    bake.settings.memoryLimit = 2;
     bake.settings.minBundles = bake.settings.maxBundles = 512;
     bake.run(paperCube(0.5f, 0.3f));
     ASSERT_TRUE(warns(reportOf(bake), WarningId::MEMORY_LIMIT));

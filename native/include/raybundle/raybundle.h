@@ -69,7 +69,7 @@ typedef enum rb_error RB_INT {
     RB_ERROR_INVALID_ARGUMENT = 2, /* the message names the argument or the object */
     /* The call came at the wrong time, such as a request for results before a bake. */
     RB_ERROR_INVALID_OPERATION = 3,
-    RB_ERROR_OUT_OF_MEMORY = 4,
+    RB_ERROR_OUT_OF_MEMORY = 4, /* there is none left, or a bake reached its memory_limit */
     RB_ERROR_UNSUPPORTED_HARDWARE = 5,
     RB_ERROR_CANCELLED = 6 /* the progress function returned false, or rb_cancel_run was called */
 } rb_error;

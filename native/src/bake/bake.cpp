@@ -24,6 +24,7 @@
 #include "bake/trace.h"
 #include "job/cancellation.h"
 #include "job/combination.h"
+#include "job/memory.h"
 #include "job/threads.h"
 #include "lights/world_source.h"
 #include "patches/reflectance.h"
@@ -117,38 +118,49 @@ Bake::~Bake() = default;
 
 // If memory runs out, or if a cancellation stops the work at any point, patches, lines and
 // solutions may be half-made. The next bake then uses none of them. After a cancellation between
-// two steps, Trace::isWhole() decides whether the next bake can use them.
+// two steps, Trace::isWhole() decides whether the next bake can use them. A bake that reaches its
+// memory limit is cancelled, too.
 void Bake::run(const Scene& scene) {
     checkCombination(settings, scene.lightSets.size());
     makeRoomForTreeBuilders();
     const Progress callers = progress;
+    const MemoryLimit limit(settings.memoryLimit);
+    memory.begin();
     Cancelled cancelled = Cancelled::NO;
-    bool isDone = false;
-    try {
-        cancelled =
-            runCancellable(callers, [&](const Progress& watched, tbb::task_group_context& context) {
-                progress = watched;
-                const Threads threads(settings.threads);
-                tbb::task_arena(threads.count).execute([&] {
-                    tbb::task_group(context).run_and_wait([&] {
-                        runAll(scene, threads);
-                        isDone = true;
-                    });
-                });
+    bool isDone = false, isTooLarge = false;
+    const auto mayGoOn = [&] { return !(isTooLarge = memory.bytes() > limit.whole); };
+    const auto work = [&](const Progress& watched, tbb::task_group_context& context) {
+        progress = watched;
+        const Threads threads(settings.threads);
+        tbb::task_arena(threads.count).execute([&] {
+            tbb::task_group(context).run_and_wait([&] {
+                runAll(scene, threads);
+                isDone = true;
             });
+        });
+    };
+    try {
+        cancelled = runCancellable(callers, mayGoOn, work);
     } catch (...) {
         progress = callers;
-        trace.reset();
-        traceOfSources.reset();
+        dropTraces();
         throw;
     }
     progress = callers;
+    if (isDone || cancelled != Cancelled::ANYWHERE)
+        memory.end();
+    else
+        dropTraces();
     if (isDone) return;
-    if (cancelled == Cancelled::ANYWHERE) {
-        trace.reset();
-        traceOfSources.reset();
-    }
+    if (isTooLarge) throw limit.reached();
     throw Error(RB_ERROR_CANCELLED, "the bake was cancelled");
+}
+
+void Bake::dropTraces() {
+    trace.reset();
+    traceOfSources.reset();
+    // What the allocator keeps of their memory is not the bake's.
+    memory = MemoryUse();
 }
 
 void Bake::runAll(const Scene& scene, const Threads& threads) {

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "bundles/line_counts.h"
+#include "job/memory.h"
 #include "job/progress.h"
 #include "job/report.h"
 #include "job/settings.h"
@@ -47,7 +48,8 @@ class Bake {
 
     // Runs all stages of the bake. The results of the previous run remain if the run fails. Throws
     // Error(INVALID_ARGUMENT) if the settings or the scene cannot be baked, Error(CANCELLED) if the
-    // caller cancels through `progress`, and std::bad_alloc if memory runs out.
+    // caller cancels through `progress`, Error(OUT_OF_MEMORY) if the bake reaches its memory
+    // limit, and std::bad_alloc if memory runs out.
     void run(const Scene& scene);
 
     bool hasRun() const { return ran; }
@@ -75,6 +77,7 @@ class Bake {
     struct Exchanged;
     struct Results;
 
+    void dropTraces();
     void runAll(const Scene& scene, const Threads& threads);
     void runDraft(const Scene& scene, const Threads& threads);
     void runAdapted(const Scene& scene, const Threads& threads);
@@ -109,6 +112,7 @@ class Bake {
     std::vector<FinerMesh> adapted;  // per instance; empty if the last run adapted no meshes
     std::string json;
     bool ran = false;
+    MemoryUse memory;
 };
 
 }  // namespace raybundle

@@ -12,13 +12,14 @@ namespace raybundle {
 namespace {
 
 // The interval at which the calling thread repeats the last progress report, so that the caller can
-// cancel between two reports.
+// cancel between two reports, and asks whether the work may go on.
 constexpr std::chrono::milliseconds kEvery(20);
 
 // State shared by the thread that works and the calling thread, which passes reports to the caller.
 class Watch {
   public:
-    explicit Watch(const Progress& progress) : progress(progress) {}
+    Watch(const Progress& progress, const std::function<bool()>& mayGoOn)
+        : progress(progress), mayGoOn(mayGoOn) {}
 
     // Progress function of the working thread: stores the report and waits until the calling thread
     // has passed it on. Returns false if the bake was cancelled. `user` is the Watch.
@@ -35,7 +36,7 @@ class Watch {
     // Runs `body` in the working thread and stores the exception that it throws, if any.
     void work(const Work& body) {
         try {
-            body(Progress(&Watch::ask, this), context);
+            body(progress.isHeard() ? Progress(&Watch::ask, this) : progress, context);
         } catch (...) {
             thrown = std::current_exception();
         }
@@ -44,12 +45,16 @@ class Watch {
         changed.notify_all();
     }
 
-    // Passes reports to the caller until the work is done. Returns whether and where the caller
-    // cancelled it. Rethrows the exception of the work unless the caller cancelled.
+    // Passes reports to the caller until the work is done. Returns whether and where it was
+    // cancelled. Rethrows the exception of the work unless it was.
     Cancelled answer() {
         std::unique_lock lock(mutex);
         while (!isDone) {
             const bool isDue = !changed.wait_for(lock, kEvery, [&] { return isAsked || isDone; });
+            if (!isDone && cancelled == Cancelled::NO && !mayGoOn()) {
+                cancelled = Cancelled::ANYWHERE;
+                context.cancel_group_execution();
+            }
             if (isDone || (isDue && !isBegun) || cancelled != Cancelled::NO) {
                 isAsked = false;
                 changed.notify_all();
@@ -73,6 +78,7 @@ class Watch {
 
   private:
     const Progress& progress;
+    const std::function<bool()>& mayGoOn;
     tbb::task_group_context context;
     std::mutex mutex;
     std::condition_variable changed;
@@ -90,17 +96,14 @@ struct Joined {
 
 }  // namespace
 
-Cancelled runCancellable(const Progress& progress, const Work& work) {
-    tbb::task_group_context untouched;
-    if (!progress.isHeard()) {
-        work(progress, untouched);
-        return Cancelled::NO;
-    }
-    Watch watch(progress);
+Cancelled runCancellable(const Progress& progress, const std::function<bool()>& mayGoOn,
+                         const Work& work) {
+    Watch watch(progress, mayGoOn);
     std::thread thread;
     try {
         thread = std::thread([&] { watch.work(work); });
     } catch (const std::system_error&) {
+        tbb::task_group_context untouched;
         work(progress, untouched);
         return Cancelled::NO;
     }

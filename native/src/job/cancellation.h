@@ -45,8 +45,9 @@ void parallelInvoke(const Bodies&... bodies) {
     throwIfCancelled();
 }
 
-// Whether the caller cancelled the work, and where: BETWEEN_STEPS in answer to a progress report of
-// the work, which leaves its data complete, or ANYWHERE, which may leave its data half-made.
+// Whether work was cancelled, and where: BETWEEN_STEPS if the caller did so in answer to a progress
+// report of the work, which leaves its data complete; ANYWHERE if the caller did so between two
+// reports, or if the work could not go on, which may leave its data half-made.
 enum class Cancelled { NO, BETWEEN_STEPS, ANYWHERE };
 
 // Work that can be cancelled. It reports to `progress` and must run its parallel loops under
@@ -54,8 +55,10 @@ enum class Cancelled { NO, BETWEEN_STEPS, ANYWHERE };
 using Work = std::function<void(const Progress& progress, tbb::task_group_context& context)>;
 // Runs `work` in a thread of its own. Meanwhile the calling thread passes the reports of the work
 // on to `progress`, and repeats the last one every 20 ms, so that the caller can cancel at any
-// time. Returns whether and where the caller cancelled. Throws what `work` throws. Without a
-// listener for the progress, or if no thread can be started, `work` runs in the calling thread.
-Cancelled runCancellable(const Progress& progress, const Work& work);
+// time. As often, it asks `mayGoOn`, and cancels the work if the answer is false. Returns whether
+// and where the work was cancelled. Throws what `work` throws, unless it was cancelled. If no
+// thread can be started, `work` runs in the calling thread, and nobody asks `mayGoOn`.
+Cancelled runCancellable(const Progress& progress, const std::function<bool()>& mayGoOn,
+                         const Work& work);
 
 }  // namespace raybundle

@@ -1,14 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "job/report.h"
 
-#ifdef _WIN32
-#include <windows.h>  // declares the types that psapi.h uses
-
-#include <psapi.h>
-#else
-#include <sys/resource.h>
-#endif
-
 #include <algorithm>
 #include <cmath>
 #include <iterator>
@@ -16,21 +8,10 @@
 #include <numeric>
 #include <utility>
 
+#include "job/memory.h"
+
 namespace raybundle {
 namespace {
-
-// Returns the peak resident memory of the whole process so far, in bytes.
-int64_t peakMemoryBytes() {
-#ifdef _WIN32
-    PROCESS_MEMORY_COUNTERS counters{};
-    GetProcessMemoryInfo(GetCurrentProcess(), &counters, sizeof(counters));
-    return int64_t(counters.PeakWorkingSetSize);
-#else
-    rusage usage{};
-    getrusage(RUSAGE_SELF, &usage);
-    return int64_t(usage.ru_maxrss) * 1024;
-#endif
-}
 
 // Functions that build JSON text. Only strings and numbers go through nlohmann::json. Its objects
 // and arrays allocate in their destructors, which would end the process when memory runs out, so
@@ -125,7 +106,7 @@ std::string Report::json() const {
                             {"absorbed", text(sum(energy.absorbed))},
                             {"escaped", text(sum(energy.escaped))},
                             {"balance_error", text(balanceError())}})},
-         {"peak_memory_bytes", text(peakMemoryBytes())},
+         {"peak_memory_bytes", text(peakResidentMemory())},
          {"adaptive_vertices", text(adaptiveVertices())},
          {"light_sets", array(lightSets,
                               [](const LightSet& set) {

@@ -105,8 +105,11 @@ inline constexpr Setting kSettings[] = {
     {"lines_per_bundle",
      "Number of lines in each bundle; 0 chooses it automatically, at two lines per patch",
      &Settings::linesPerBundle, 0, 1 << 26},
-    {"memory_limit", "Maximum memory for the exchanges between patches, in MB",
-     &Settings::memoryLimit, 1, 1e9, "MB"},
+    {"memory_limit",
+     "Maximum memory of a bake, in MB, half of it for the exchanges between patches; 0 allows "
+     "three "
+     "quarters of the computer's memory",
+     &Settings::memoryLimit, 0, 1e9, "MB"},
     {"seed", "Seed of the random numbers; the same seed gives the same noise", &Settings::seed, 0,
      INT32_MAX},
     {"threads", "Number of processor threads; 0 uses all", &Settings::threads, 0, 1024},

@@ -34,7 +34,7 @@ struct Settings : Skips {
     int minBundles = 64;
     int maxBundles = kMostWindowBundles;
     int linesPerBundle = 0;
-    float memoryLimit = 4096;
+    float memoryLimit = 0;
     int seed = 0;
     int threads = 0;
     float regularization = 0.005f;

@@ -2,9 +2,9 @@
 //
 // LINE_REUSE as a transport. While bundles are traced, their lines are only counted. Light moves
 // when the system on the counts is solved (transport/line_reuse.h). When the counts would exceed
-// the memory limit, they are dropped, and each further bundle improves the solution by itself
-// (transport/streaming_reuse.h). Light sets share the lines: the transport of one light set traces
-// them, and advances the transports of the others.
+// their share of the memory limit, they are dropped, and each further bundle improves the solution
+// by itself (transport/streaming_reuse.h). Light sets share the lines: the transport of one light
+// set traces them, and advances the transports of the others.
 
 #include <algorithm>
 #include <array>
@@ -12,6 +12,7 @@
 #include <optional>
 
 #include "job/cancellation.h"
+#include "job/memory.h"
 #include "patches/side.h"
 #include "surfaces/translucence.h"
 #include "transport/line_reuse.h"
@@ -24,7 +25,7 @@ namespace {
 // Sides that fewer lines met than this also gather with local rays.
 constexpr uint32_t kStarvedLines = 16;
 // Limits for the traced lines that are held before they are merged into the counts: in bytes, and
-// as a share of the memory limit.
+// as a share of the memory for the counts.
 constexpr size_t kMergeBytes = size_t(256) << 20;
 constexpr double kMergeShare = 0.25;
 // Number of bundles between two checks of the cancel flag.
@@ -44,7 +45,7 @@ class LineReuseTransport : public Transport {
         : input(input),
           solver(input.patches, input.counts, input.shot, input.worldRadiance, input.exposed,
                  input.isShown, {input.settings.targetError, input.settings.draft != 0}),
-          limit(size_t(input.settings.memoryLimit * 1e6)),
+          limit(MemoryLimit(input.settings.memoryLimit).exchanges),
           own(input.solutions ? 0 : input.patches.sideCount()),
           last(input.solutions ? *input.solutions : own) {}
 
@@ -131,8 +132,9 @@ class LineReuseTransport : public Transport {
         if (streaming[0])
             report.warn(
                 WarningId::MEMORY_LIMIT,
-                "memory_limit was reached at " + std::to_string(input.counts.bundles) +
-                    " bundles. The other " + std::to_string(bundleCount() - input.counts.bundles) +
+                "the half of memory_limit that lines may take was full at " +
+                    std::to_string(input.counts.bundles) + " bundles. The other " +
+                    std::to_string(bundleCount() - input.counts.bundles) +
                     " bundles were used once and discarded. The result is therefore less precise, "
                     "and relighting has to trace these bundles again; increase memory_limit");
         return result;
@@ -209,13 +211,13 @@ class LineReuseTransport : public Transport {
 
     const TransportInput input;
     const LineReuse solver;
-    // Memory limit of the bake, bytes.
+    // Memory for the counts, bytes.
     const size_t limit;
     // The solutions if `input` has none, and a reference to the solutions in use.
     LineSolutions own;
     LineSolutions& last;
     uint64_t solves = 0;
-    // Per half. Empty until the memory limit is reached.
+    // Per half. Empty until that memory is full.
     std::array<std::optional<StreamingReuse>, 2> streaming;
     // Only while streaming. `first` also contains light by direction in its indirect part.
     HandOver first;
