@@ -55,9 +55,9 @@ enum class Cancelled { NO, BETWEEN_STEPS, ANYWHERE };
 using Work = std::function<void(const Progress& progress, tbb::task_group_context& context)>;
 // Runs `work` in a thread of its own. Meanwhile the calling thread passes the reports of the work
 // on to `progress`, and repeats the last one every 20 ms, so that the caller can cancel at any
-// time. As often, it asks `mayGoOn`, and cancels the work if the answer is false. Returns whether
-// and where the work was cancelled. Throws what `work` throws, unless it was cancelled. If no
-// thread can be started, `work` runs in the calling thread, and nobody asks `mayGoOn`.
+// time. At least as often, it asks `mayGoOn`, and cancels the work if the answer is false. Returns
+// whether and where the work was cancelled. Throws what `work` throws, unless it was cancelled. If
+// no thread can be started, `work` runs in the calling thread, and nobody asks `mayGoOn`.
 Cancelled runCancellable(const Progress& progress, const std::function<bool()>& mayGoOn,
                          const Work& work);
 

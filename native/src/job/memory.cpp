@@ -23,7 +23,8 @@ namespace {
 constexpr double kShare = 0.75;
 // Share of a bake's memory that is for exchanges.
 constexpr double kOfExchanges = 0.5;
-// Memory that every bake may take, in bytes: threads, libraries and small scenes need about half.
+// Memory that every bake may take, in bytes. The first bake of a process takes about 50 MB in a
+// small room, most of it for threads and libraries.
 constexpr size_t kForAnyBake = 256'000'000;
 
 #ifdef _WIN32
