@@ -10,6 +10,7 @@
 
 #include "job/cancellation.h"
 #include "patches/neighbours.h"
+#include "stated_error/dense_surplus.h"
 #include "stated_error/object_noise.h"
 #include "stated_error/surplus.h"
 
@@ -96,7 +97,10 @@ class InstanceErrors {
           sides(sides),
           light(light),
           surplus(surplusOf({patches, sides.exposed}, range.firstParent, range.lastParent,
-                            instance.side, sides.irradiance, sides.directError)) {
+                            instance.side, sides.irradiance, sides.directError)),
+          ofDense(isDense() ? denseSurplus(patches, range.firstParent, range.lastParent,
+                                           instance.side, sides.isGathered, light)
+                            : std::vector<float>()) {
         std::vector<double> exposed(range.lastCell - range.firstCell, 0.0);  // per cell, m^2
         double gatheredArea = 0;
         forEachPatch([&](uint32_t at, double weight, const Cell& cell, const auto&, double residual,
@@ -175,6 +179,7 @@ class InstanceErrors {
   private:
     static double square(const glm::vec3& v) { return double(glm::dot(v, v)); }
     glm::vec3 lightAt(uint32_t at) const { return sides.irradiance.all(at); }
+    bool isDense() const { return light.gatheredNoise && !instance.hasSparseResults; }
     bool isGathered(uint32_t at) const { return light.gatheredNoise && sides.isGathered[at]; }
     bool hasResult(uint32_t at) const {
         return instance.hasResultOnFace(size_t(patches.parentAt(at).face));
@@ -188,7 +193,7 @@ class InstanceErrors {
     // Returns the share of the noise that differs from patch to patch and that the corners cannot
     // follow.
     double rippleShare() const {
-        if (sides.noise.empty()) return 0;
+        if (sides.noise.empty() || gatheredShare == 1) return 0;
         double rough = 0, all = 0;
         for (const TilePair& pair :
              neighbouringTiles(patches, range.firstParent, range.lastParent)) {
@@ -236,7 +241,8 @@ class InstanceErrors {
                 const double known = double(whole.smooth - beyond.smooth) +
                                      std::max(0.0, double(whole.step - beyond.step));
                 if (isGathered(at))
-                    body(at, weight, cell, w, 0.0,
+                    body(at, weight, cell, w,
+                         ofDense.empty() ? 0.0 : double(ofDense[patch - first]),
                          Surplus{true,
                                  light.gatheredSurplus * light.gatheredSurplus *
                                      float(square(lightAt(at))),
@@ -255,6 +261,7 @@ class InstanceErrors {
     const SideErrors& sides;
     const InstanceLight& light;
     const std::vector<Surplus> surplus;
+    const std::vector<float> ofDense;  // empty if the corners have not gathered as on dense faces
     Squares sum;
     double gatheredShare = 0;
     double corners = 0;  // about the number of corners of the cells with a result

@@ -6,7 +6,8 @@
 // - discretisation: the difference between the light and the best linear function on each patch,
 //   which no result made of the patches can show (stated_error/surplus.h);
 // - mesh: the difference between the interpolation over the corners and the light of the patches,
-//   which a finer mesh would remove.
+//   which a finer mesh would remove. Where corners have gathered their light on dense surfaces, it
+//   is estimated from this light (stated_error/dense_surplus.h).
 // Together they estimate the surface error: the difference between the interpolated result and the
 // true light, at all points of the faces.
 #pragma once
@@ -43,8 +44,8 @@ struct SideErrors {
 // too much light, or all too little. The halves then give only a single sample, and no object is
 // stated to have less noise than the whole scene.
 // Results that corners gathered (InstanceLight::gatheredNoise) are the light at points. Their
-// errors are noise and, where light was interpolated between places that gather, the error of this
-// interpolation (InstanceLight::gatheredSurplus), which counts as discretisation.
+// errors are noise, that of the mesh, and, where light was interpolated between places that gather,
+// the error of this interpolation (InstanceLight::gatheredSurplus), which counts as discretisation.
 void stateErrors(const Scene& scene, const Tiles& tiles, const std::vector<InstanceRange>& ranges,
                  const SideErrors& sides, const Settings& settings,
                  std::vector<InstanceLight>& light, Report& report);
