@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <glm/gtc/matrix_transform.hpp>
+#include <memory>
 #include <numeric>
 #include <random>
 
@@ -278,6 +279,84 @@ TEST(AdaptedMeshes, AreCountedBeforeOneDecides) {
         for (const Json& report : {before, after})
             EXPECT_EQ(size_t(report["objects"][size_t(i)]["adaptive_vertices"]),
                       bake.adaptedMesh(i).vertices.size());
+}
+
+// Bakes with tiles of 0.5 m, in clusters or face by face.
+std::unique_ptr<Bake> bakeDensePlane(const Scene& scene, bool adapts, bool skipsClusters = true) {
+    auto bake = std::make_unique<Bake>();
+    bake->settings.patchSize = 0.5f;
+    bake->settings.adaptMeshes = adapts;
+    bake->settings.skipClusters = skipsClusters;
+    bake->run(scene);
+    return bake;
+}
+
+// Compares the adapted plane with that of a bake face by face, where light is known on each face.
+// Both choose triangles by shadow rays to points, which are others where meshes differ.
+void expectAsFaceByFace(const Bake& adapted, const Scene& scene) {
+    const auto faceByFace = bakeDensePlane(scene, true, false);
+    auto error = [&](const Bake& bake) {
+        return surfaceError(adaptedMesh(bake, scene, 0), cornerLight(bake, 0, RB_OUTPUT_LIGHTING));
+    };
+    EXPECT_LT(error(adapted), 1.2 * error(*faceByFace));
+    EXPECT_LT(double(vertexCount(adapted, scene)), 1.1 * double(vertexCount(*faceByFace, scene)));
+    std::printf("[ figures  ] %zu and %zu vertices, error %.4f and %.4f\n",
+                vertexCount(adapted, scene), vertexCount(*faceByFace, scene), error(adapted),
+                error(*faceByFace));
+}
+
+// The faces exchange light in clusters, which know nothing of the edge of the shadow within them.
+TEST(AdaptedMeshes, DenseSurfacesGetVerticesAtTheEdgesOfShadowsToo) {
+    const Scene scene = cubeOnPlane(glm::dmat4(1.0), 100);
+    const auto kept = bakeDensePlane(scene, false), adapted = bakeDensePlane(scene, true);
+    EXPECT_LT(size_t(reportOf(*kept)["patches"]), 3000u);
+    const double before = surfaceError(scene.meshes[0], cornerLight(*kept, 0, RB_OUTPUT_LIGHTING));
+    const double stated = reportOf(*kept)["objects"][0]["error"]["mesh"];
+    std::printf("[ figures  ] error %.4f, stated %.4f\n", before, stated);
+    EXPECT_GT(before, 0.02);
+    // Edges along diagonals of the faces are ramps over two faces, and count less.
+    EXPECT_GT(stated, 0.5 * before);
+    EXPECT_LT(stated, 1.5 * before);
+    EXPECT_LT(
+        surfaceError(adaptedMesh(*adapted, scene, 0), cornerLight(*adapted, 0, RB_OUTPUT_LIGHTING)),
+        0.02);
+    expectAsFaceByFace(*adapted, scene);
+    Bake counting;
+    counting.settings.patchSize = 0.5f;
+    counting.settings.countAdaptive = 1;
+    counting.run(scene);
+    EXPECT_EQ(size_t(reportOf(counting)["adaptive_vertices"]), vertexCount(*adapted, scene));
+}
+
+// The plane as one mesh, one half of which is dense and the other a single face.
+TEST(AdaptedMeshes, DenseSurfacesAndLargeFacesAdaptInOneMesh) {
+    for (const float denseFrom : {-kHalf, 0.0f}) {
+        Scene scene = cubeOnPlane();
+        Mesh& plane = scene.meshes[0];
+        const int32_t material = plane.faceMaterials.front();
+        plane = grid("plane", {denseFrom, -kHalf, 0}, {kHalf, 0, 0}, {0, 2 * kHalf, 0}, 50, 100);
+        const Mesh rest = rectangle("rest", {denseFrom < 0 ? 0 : -kHalf, -kHalf, 0}, {kHalf, 0, 0},
+                                    {0, 2 * kHalf, 0});
+        for (const int32_t v : rest.cornerVertices)
+            plane.cornerVertices.push_back(v + int32_t(plane.vertices.size()));
+        plane.vertices.insert(plane.vertices.end(), rest.vertices.begin(), rest.vertices.end());
+        plane.faceOffsets.push_back(int32_t(plane.cornerVertices.size()));
+        plane.faceMaterials.assign(plane.faceCount(), material);
+        EXPECT_LT(size_t(reportOf(*bakeDensePlane(scene, false))["patches"]), 3000u);
+        expectAsFaceByFace(*bakeDensePlane(scene, true), scene);
+    }
+}
+
+TEST(AdaptedMeshes, DenseSurfacesKeepMeshesThatShowTheirLight) {
+    Scene scene = closedCube(0.5f, 1);
+    place(scene, icosphere("ball", 0.3f, 4, false), grey("ball", 0.5f),
+          glm::translate(glm::dmat4(1), {0.5, 0.45, 0.55}));
+    Bake bake;
+    bake.settings.patchSize = 0.1f;
+    bake.settings.adaptMeshes = 1;
+    bake.run(scene);
+    EXPECT_LT(size_t(reportOf(bake)["patches"]), 3000u);
+    EXPECT_EQ(bake.adaptedMesh(1).vertices.size(), scene.meshes[1].vertices.size());
 }
 
 TEST(AdaptedMeshes, EveryObjectOfAMeshGetsItsOwn) {

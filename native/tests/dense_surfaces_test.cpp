@@ -352,12 +352,18 @@ TEST(DenseSurfaces, ShowTheSumOfTheirLightSets) {
     EXPECT_LT(noise(sum, bake->instanceLight(kBall).direct), 1e-5);
 }
 
-TEST(DenseSurfaces, AreNotWhereMeshesAreAdapted) {
+TEST(DenseSurfaces, AreNotOnMeshesThatWereAdapted) {
+    Scene scene = roomWithDenseBall(true);
+    scene.instances[size_t(kBall)].isAdapted = true;
+    const Patches patches = subdivide(scene, 0.2f, 100000);
+    EXPECT_EQ(std::count(patches.isDense.begin(), patches.isDense.end(), true), 0);
+}
+
+TEST(DenseSurfaces, GatherOnlyWithTheSettingsThatAllowIt) {
     Settings settings;
     EXPECT_TRUE(gathersDenseSurfaces(settings));
     for (const auto& change :
-         {+[](Settings& s) { s.adaptMeshes = 1; }, +[](Settings& s) { s.countAdaptive = 1; },
-          +[](Settings& s) { s.finalGather = 0; }, +[](Settings& s) { s.skipClusters = 0; },
+         {+[](Settings& s) { s.finalGather = 0; }, +[](Settings& s) { s.skipClusters = 0; },
           +[](Settings& s) { s.reconstruction = Reconstruction::POINT; }}) {
         Settings other;
         change(other);

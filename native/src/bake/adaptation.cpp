@@ -26,6 +26,7 @@ Scene adaptedScene(const Scene& scene, const std::vector<FinerMesh>& adapted) {
         if (!adapted[i].isFinerThan(meshOf(scene, i))) continue;
         result.meshes.push_back(adapted[i].withAttributesOf(meshOf(scene, i)));
         result.instances[i].mesh = int32_t(result.meshes.size()) - 1;
+        result.instances[i].isAdapted = true;
     }
     return result;
 }

@@ -453,7 +453,7 @@ std::vector<InstanceLight> Bake::show(const SolveInput& in, const SetLights& lig
     stateErrors(in.scene, in.tiles, ranges, sides, settings, made, report);
     if (meshes || (settings.countAdaptive && !settings.adaptMeshes)) {
         std::vector<FinerMesh> adapted =
-            adaptMeshes({input, in.tiles, sides}, ranges, progress, report);
+            adaptMeshes({input, in.tiles, sides, made}, ranges, progress, report);
         for (size_t i = 0; i < adapted.size(); ++i)
             report.objects[i].adaptiveVertices = adapted[i].vertices.size();
         if (meshes) *meshes = std::move(adapted);

@@ -41,7 +41,7 @@ uint64_t geometryHash(const Scene& scene, const Settings& settings) {
     addOpacity(scene, hasher);
     for (const Instance& instance : scene.instances) {
         hasher.add(instance.mesh, instance.transform, instance.stopsDirect, instance.exchanges,
-                   instance.patchFactor);
+                   instance.patchFactor, instance.isAdapted);
     }
     hasher.add(settings.patchSize, settings.maxPatches, settings.refine, settings.contacts,
                settings.linesPerBundle, settings.seed, settings.planeCount, settings.planeCoherence,

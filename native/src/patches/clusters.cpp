@@ -243,9 +243,10 @@ std::vector<bool> findDense(const Patches& patches, const Density& density) {
     std::vector<bool> isDense(patches.count());
     for (uint32_t patch = 0; patch < isDense.size(); ++patch) {
         throwIfCancelledAt(patch);
-        isDense[patch] = canJoin(patches, patch) && pieces[patches.parentAt(2 * patch).cell] == 1 &&
+        const Parent& parent = patches.parentAt(2 * patch);
+        isDense[patch] = !parent.isAdapted && canJoin(patches, patch) && pieces[parent.cell] == 1 &&
                          isSmall(patch);
-        const size_t surface = patches.parentAt(2 * patch).surface;
+        const size_t surface = parent.surface;
         counts.resize(std::max(counts.size(), surface + 1));
         counts[surface] += isDense[patch];
     }

@@ -39,7 +39,8 @@ std::vector<uint32_t> findClusters(const Patches& patches, const std::vector<boo
 // Returns for each patch whether it lies on a dense surface and is small: a dense surface is
 // connected and has many patches that are whole faces, much smaller than tiles, opaque and not
 // translucent. Pieces of faces that walls have cut are not among them. On an object that has such a
-// surface, others with an eighth of the patches are dense too, as the eyes of a head.
+// surface, others with an eighth of the patches are dense too, as the eyes of a head. Meshes that
+// were adapted to the light of their patches (Parent::isAdapted) have no dense surfaces.
 std::vector<bool> findDense(const Patches& patches, const Density& density);
 
 // Sets the density and the dense patches (Patches::isDense) such that at most `most` patches of

@@ -141,6 +141,7 @@ class FaceCutting {
             parent.isInward = shells[face] == Shell::INWARD;
             parent.stopsDirect = scene.instances[cell.instance].stopsDirect;
             parent.exchanges = scene.instances[cell.instance].exchanges;
+            parent.isAdapted = scene.instances[cell.instance].isAdapted;
             parent.island = sizes.island[faces.piece[face]];
             parent.surface = faces.surface[face];
         }

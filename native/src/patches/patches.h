@@ -61,8 +61,8 @@ struct Parent {
     // A rank of the surface by area: larger objects have larger ranks, and within objects of equal
     // size larger connected surfaces do.
     uint32_t surfaceSize = 0;
-    // Copied from the instance (Instance::stopsDirect and Instance::exchanges).
-    bool stopsDirect = true, exchanges = true;
+    // Copied from the instance (Instance::stopsDirect, Instance::exchanges, Instance::isAdapted).
+    bool stopsDirect = true, exchanges = true, isAdapted = false;
     uint32_t instance = 0;  // index in Scene::instances
     int32_t face = 0;       // face of the instance's mesh
     uint32_t island = 0;    // index in Patches::islands

@@ -61,13 +61,15 @@ void fillPatches(const Scene& scene, Patches& patches) {
     assignMaterials(scene, patches);
 }
 
-// Returns per instance whether its light is a result.
+// Returns per instance whether its light is a result, and its surfaces can be dense.
 std::vector<bool> bakedInstances(const Scene& scene) {
     std::vector<bool> isBaked;
     for (const Instance& instance : scene.instances)
         isBaked.push_back(instance.role == RB_ROLE_BAKE);
     if (std::find(isBaked.begin(), isBaked.end(), true) == isBaked.end())
         isBaked.assign(isBaked.size(), true);
+    for (size_t i = 0; i < isBaked.size(); ++i)
+        if (scene.instances[i].isAdapted) isBaked[i] = false;
     return isBaked;
 }
 

@@ -31,8 +31,7 @@ bool gathersSparseResults(const Settings& settings) {
 
 bool gathersDenseSurfaces(const Settings& settings) {
     return gathersSparseResults(settings) && settings.skipClusters &&
-           settings.reconstruction == Reconstruction::LEAST_SQUARES && !settings.adaptMeshes &&
-           !settings.countAdaptive;
+           settings.reconstruction == Reconstruction::LEAST_SQUARES;
 }
 
 std::vector<bool> shownSides(const Scene& scene, const Patches& patches, const Settings& settings) {

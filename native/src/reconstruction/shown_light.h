@@ -26,7 +26,7 @@ namespace raybundle {
 // instead of taking the light of patches (reconstruction/corner_gather.h).
 bool gathersSparseResults(const Settings& settings);
 // Returns whether, with these settings, the nodes of dense surfaces (Patches::isDense) gather
-// (reconstruction/node_gather.h). They do not if meshes are adapted to the light of their patches.
+// (reconstruction/node_gather.h).
 bool gathersDenseSurfaces(const Settings& settings);
 
 // Returns for each patch side whether its light is shown, on the side itself or through a

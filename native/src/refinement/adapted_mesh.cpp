@@ -23,6 +23,8 @@ constexpr size_t kUnknowns = 3;
 // A triangle is sampled at points if the mean square error that tiles expect in it is above this
 // share of that which is allowed.
 constexpr double kWorthPoints = 0.1;
+// The same on dense surfaces, where the light at corners shows jumps better than tiles do.
+constexpr double kWorthPointsDense = 1;
 // Mean square difference of the nearest continuous function of linear pieces from the light,
 // relative to that of the nearest function in each triangle alone. Measured: 1.4 to 2.9 where light
 // is smooth, 3.5 at the edge of a hard shadow.
@@ -183,7 +185,8 @@ bool AdaptedMesh::measureAtTiles(uint32_t index) {
     const double here = isMixed[*tile] ? INFINITY : double(light.tile(*tile).beyond);
     fits[index] = fit(triangle, tiles);
     const double mean = (area > 0 ? std::max(beyond / area, here) : here) + fits[index].meanSquare;
-    if (mean > kWorthPoints * std::min(ofScene, ofObject)) return true;
+    const double worth = light.isDense(triangle.face) ? kWorthPointsDense : kWorthPoints;
+    if (mean > worth * std::min(ofScene, ofObject)) return true;
     errors[index] = refined.area(triangle) * mean;
     return false;
 }

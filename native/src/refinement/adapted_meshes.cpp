@@ -328,6 +328,7 @@ std::vector<FinerMesh> adaptMeshes(const KnownLight& known,
     const Scene& scene = known.scene;
     const size_t mostOfAll = size_t(known.settings.maxVertices);
     std::vector<FinerMesh> result(scene.instances.size());
+    const std::vector<bool> isAllGathered = known.shown.instancesAllGathered();
     std::vector<size_t> worthwhile;
     size_t vertices = 0, kept = 0;  // of all meshes, and of those that stay as they are
     for (size_t i = 0; i < scene.instances.size(); ++i) {
@@ -335,8 +336,10 @@ std::vector<FinerMesh> adaptMeshes(const KnownLight& known,
         if (instance.role != RB_ROLE_BAKE) continue;
         const Mesh& mesh = scene.meshes[size_t(instance.mesh)];
         const Report::Errors& error = report.objects[i].error;
-        const bool isWorth = std::hypot(error.mesh, error.discretisation) >
-                             kWorthMesh * double(instance.noiseFactor * known.settings.targetError);
+        // What nodes lose between the places where they gather is not an error of the mesh.
+        const double ofMesh = std::hypot(error.mesh, isAllGathered[i] ? 0.0 : error.discretisation);
+        const bool isWorth =
+            ofMesh > kWorthMesh * double(instance.noiseFactor * known.settings.targetError);
         if (isWorth) worthwhile.push_back(i);
         result[i] = FinerMesh::of(mesh);
         vertices += mesh.vertices.size();

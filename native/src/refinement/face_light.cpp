@@ -7,6 +7,7 @@
 #include "job/cancellation.h"
 #include "patches/neighbours.h"
 #include "patches/side.h"
+#include "stated_error/dense_surplus.h"
 #include "visibility/local_lines.h"
 
 namespace raybundle {
@@ -29,6 +30,10 @@ FaceLight::FaceLight(const KnownLight& known, uint32_t index, const InstanceRang
     const std::vector<Surplus> surplus =
         surplusOf({patches, sides.exposed}, range.firstParent, range.lastParent, instance.side,
                   sides.irradiance, sides.directError);
+    std::vector<float> ofDense;
+    if (known.light[index].gatheredNoise)
+        ofDense = denseSurplus(patches, range.firstParent, range.lastParent, instance.side,
+                               sides.isGathered, known.light[index]);
     for (uint32_t p = range.firstParent; p < range.lastParent; ++p) {
         throwIfCancelledAt(p);
         const Parent& parent = patches.parents[p];
@@ -46,7 +51,11 @@ FaceLight::FaceLight(const KnownLight& known, uint32_t index, const InstanceRang
                                        3 * std::pow(sides.directError[tile.side], 2.0f);
             tile.sample.weight = share > kHalfCovered ? float(tile.area) * share : 0.0f;
             const Surplus& more = surplus[tiles.size()];
-            if (more.isKnown) tile.beyond = more.smooth + std::max(more.step, 0.0f);
+            tile.isDense = known.shown.isGatheredAtNodes(known.tiles.firstSide(tile.side));
+            if (tile.isDense)
+                tile.beyond = ofDense[tiles.size()];
+            else if (more.isKnown)
+                tile.beyond = more.smooth + std::max(more.step, 0.0f);
             area += double(tile.sample.weight);
             squares += double(tile.sample.weight * squareOf(tile.sample.light));
             tiles.push_back(tile);

@@ -29,7 +29,8 @@ namespace raybundle {
 // What the light on faces is known from. All references must outlive the object.
 struct KnownLight : ReconstructionInput {
     const Tiles& tiles;
-    const SideErrors& sides;  // the shown light of the tiles, and its errors
+    const SideErrors& sides;                  // the shown light of the tiles, and its errors
+    const std::vector<InstanceLight>& light;  // per instance, at corners
 };
 
 // The light at a point, or on a tile whose centroid is the point.
@@ -53,6 +54,7 @@ class FaceLight {
         // Mean square that no linear function shows, summed over RGB, (W/m^2)^2. Infinite if the
         // tiles around do not say, as beside a contact.
         float beyond = INFINITY;
+        bool isDense = false;  // on a dense surface: `beyond` is what the corners of the face say
     };
     // Returns the index of the first tile of a face, and that of the first beyond the face.
     std::array<uint32_t, 2> tilesOf(int32_t face) const {
@@ -65,6 +67,11 @@ class FaceLight {
         return !known.shown.isOwnAlone(known.tiles.firstSide(tiles[tile].side));
     }
     const Tile& tile(uint32_t index) const { return tiles[index]; }
+    // Returns whether a face lies on a dense surface.
+    bool isDense(int32_t face) const {
+        const auto [begin, end] = tilesOf(face);
+        return begin < end && tiles[begin].isDense;
+    }
     // Returns the tile of a face that contains a point (m, relative to Patches::centre). Empty if
     // the face has none.
     std::optional<uint32_t> tileAt(int32_t face, const glm::dvec3& point) const;

@@ -82,6 +82,9 @@ struct Instance {
     // Whether the corners with a result are few among all corners, as on a mesh that a modifier has
     // subdivided.
     bool hasSparseResults = false;
+    // Whether the mesh has been adapted to the light of its patches, so that its vertices show what
+    // the patches have got.
+    bool isAdapted = false;
 
     // Returns whether the corners at a vertex of the mesh have a result.
     bool hasResultAtVertex(size_t vertex) const {
